@@ -1,0 +1,1 @@
+"""The nouns and the maths; imports nothing else of standoff."""

@@ -1,0 +1,132 @@
+"""Pinhole camera with Brown-Conrady lens distortion: undistort and distort points.
+
+Half-pixel convention, written down once: the centre of the top-left pixel is (0, 0), as in OpenCV.
+Boxes `xyxy_px` use the same coordinates for their edges.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from standoff.core.homography import FloatArray
+
+_UNDISTORT_ITERATIONS = 50
+_UNDISTORT_TOLERANCE = 1e-12
+
+
+@dataclass(frozen=True, slots=True)
+class Camera:
+    """A calibrated camera.
+
+    Attributes:
+        width_px: Width of the pictures that it was calibrated on.
+        height_px: Their height.
+        matrix: (3, 3) camera matrix: fx, fy, cx, cy in pixels, no skew.
+        distortion: (5,) k1, k2, p1, p2, k3 of Brown and Conrady in OpenCV's order.
+    """
+
+    width_px: int
+    height_px: int
+    matrix: FloatArray
+    distortion: FloatArray
+
+    def __post_init__(self) -> None:
+        matrix = np.array(self.matrix, dtype=np.float64)
+        distortion = np.array(self.distortion, dtype=np.float64).ravel()
+        if matrix.shape != (3, 3) or distortion.shape != (5,):
+            raise ValueError(f"matrix must be (3, 3), distortion (5,), not {matrix.shape} and {distortion.shape}")
+        if not (np.isfinite(matrix).all() and np.isfinite(distortion).all()):
+            raise ValueError("camera matrix and distortion must be finite")
+        if matrix[0, 0] <= 0 or matrix[1, 1] <= 0:
+            raise ValueError("focal lengths must be positive")
+        matrix.setflags(write=False)
+        distortion.setflags(write=False)
+        object.__setattr__(self, "matrix", matrix)
+        object.__setattr__(self, "distortion", distortion)
+
+    def scaled_to(self, width_px: int, height_px: int) -> Camera:
+        """Return the same camera for pictures of another size and the same field of view.
+
+        Raises:
+            ValueError: The aspect ratio differs by more than one per cent, so the field of view does too.
+        """
+        scale_x, scale_y = width_px / self.width_px, height_px / self.height_px
+        if abs(scale_x / scale_y - 1.0) > 0.01:
+            raise ValueError(
+                f"the camera is calibrated for {self.width_px}x{self.height_px}, "
+                f"the picture is {width_px}x{height_px}: another aspect ratio"
+            )
+        half_pixel = np.array([[1.0, 0.0, 0.5], [0.0, 1.0, 0.5], [0.0, 0.0, 1.0]])
+        to_new = np.linalg.inv(half_pixel) @ np.diag([scale_x, scale_y, 1.0]) @ half_pixel
+        return Camera(width_px, height_px, to_new @ self.matrix, self.distortion)
+
+    def _to_normalised(self, points_px: FloatArray) -> FloatArray:
+        focal = np.array([self.matrix[0, 0], self.matrix[1, 1]])
+        normalised: FloatArray = (np.asarray(points_px, dtype=np.float64).reshape(-1, 2) - self.matrix[:2, 2]) / focal
+        return normalised
+
+    def _to_pixels(self, normalised: FloatArray) -> FloatArray:
+        points_px: FloatArray = normalised * np.array([self.matrix[0, 0], self.matrix[1, 1]]) + self.matrix[:2, 2]
+        return points_px
+
+    def _distorted(self, normalised: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return distorted normalised points (N, 2) and their Jacobian (N, 2, 2)."""
+        k1, k2, p1, p2, k3 = self.distortion
+        x, y = normalised.T
+        r2 = x * x + y * y
+        radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+        slope = k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3)
+        distorted = np.column_stack(
+            [
+                x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
+                y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
+            ]
+        )
+        jacobian = np.empty((len(x), 2, 2))
+        jacobian[:, 0, 0] = radial + 2.0 * x * x * slope + 2.0 * p1 * y + 6.0 * p2 * x
+        jacobian[:, 0, 1] = jacobian[:, 1, 0] = 2.0 * x * y * slope + 2.0 * p1 * x + 2.0 * p2 * y
+        jacobian[:, 1, 1] = radial + 2.0 * y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x
+        return distorted, jacobian
+
+    def distort(self, points_px: FloatArray) -> FloatArray:
+        """Move ideal pinhole pixels to where the lens puts them.
+
+        Args:
+            points_px: (N, 2), undistorted.
+
+        Returns:
+            (N, 2), as seen in the picture.
+        """
+        return self._to_pixels(self._distorted(self._to_normalised(points_px))[0])
+
+    def undistort(self, points_px: FloatArray) -> FloatArray:
+        """Remove the lens distortion from picture points by Newton's method.
+
+        Args:
+            points_px: (N, 2), as seen in the picture.
+
+        Returns:
+            (N, 2) pixels of an ideal pinhole camera with the same matrix; NaN where the lens model has
+            no inverse (a point outside the field of view that the lens polynomial can describe).
+        """
+        wanted = self._to_normalised(points_px)
+        estimate = wanted.copy()
+        for _ in range(_UNDISTORT_ITERATIONS):
+            distorted, jacobian = self._distorted(estimate)
+            error = distorted - wanted
+            if not len(error) or np.nanmax(np.abs(error), initial=0.0) < _UNDISTORT_TOLERANCE:
+                break
+            determinant = jacobian[:, 0, 0] * jacobian[:, 1, 1] - jacobian[:, 0, 1] * jacobian[:, 1, 0]
+            with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+                estimate = estimate - np.column_stack(
+                    [
+                        (jacobian[:, 1, 1] * error[:, 0] - jacobian[:, 0, 1] * error[:, 1]) / determinant,
+                        (jacobian[:, 0, 0] * error[:, 1] - jacobian[:, 1, 0] * error[:, 0]) / determinant,
+                    ]
+                )
+        distorted, jacobian = self._distorted(estimate)
+        unfolded = (np.linalg.det(jacobian) > 0) & (np.abs(distorted - wanted).max(axis=1, initial=0.0) < 1e-9)
+        estimate[~unfolded] = np.nan
+        return self._to_pixels(estimate)

@@ -1,0 +1,65 @@
+"""The label set: what can be on a site, how tall, how wide, and how far it reaches.
+
+Heights and footprints are of common machines of each class (20 t excavator, 18 t wheel loader, 25 t
+dump truck, 10 t roller, passenger car or van); they are priors, not measurements. The action radii
+of worker, wheel loader and excavator are the paper's (section 6.1, Table 6); those of the other
+machines are half their length plus 1 m of articulation, which nobody has published.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+
+class Role(Enum):
+    """What a class is to the hazard rules."""
+
+    PERSON = "person"
+    EQUIPMENT = "equipment"
+    REFERENCE = "reference"
+
+
+@dataclass(frozen=True, slots=True)
+class SiteClass:
+    """One class of thing on a site.
+
+    Attributes:
+        id: Position in `CLASSES`; `class_id` everywhere in standoff, whatever the model's own ids are.
+        name: The label.
+        role: Person, equipment or reference object.
+        height_m: Typical height above the ground.
+        length_m: Longer side of the footprint.
+        width_m: Shorter side of the footprint.
+        action_radius_m: Radius of the struck-by hazard circle around it.
+    """
+
+    id: int
+    name: str
+    role: Role
+    height_m: float
+    length_m: float
+    width_m: float
+    action_radius_m: float
+
+
+CLASSES: tuple[SiteClass, ...] = (
+    SiteClass(0, "worker", Role.PERSON, 1.75, 0.6, 0.5, 2.0),
+    SiteClass(1, "excavator", Role.EQUIPMENT, 3.0, 9.5, 2.8, 12.1),
+    SiteClass(2, "wheel_loader", Role.EQUIPMENT, 3.4, 8.0, 2.7, 5.8),
+    SiteClass(3, "dump_truck", Role.EQUIPMENT, 3.3, 8.5, 2.6, 5.3),
+    SiteClass(4, "roller_or_dozer", Role.EQUIPMENT, 3.0, 5.5, 2.4, 3.8),
+    SiteClass(5, "vehicle", Role.EQUIPMENT, 1.8, 4.8, 1.9, 3.4),
+    SiteClass(6, "reference", Role.REFERENCE, 0.0, 0.0, 0.0, 0.0),
+)
+
+CLASS_BY_NAME: dict[str, SiteClass] = {site_class.name: site_class for site_class in CLASSES}
+
+
+def class_ids(role: Role) -> tuple[int, ...]:
+    """Return the ids of all classes with a role.
+
+    >>> class_ids(Role.PERSON)
+    (0,)
+    """
+    return tuple(site_class.id for site_class in CLASSES if site_class.role is role)

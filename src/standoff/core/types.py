@@ -1,0 +1,416 @@
+"""The nouns: one frozen struct of arrays for each arrow between two stages.
+
+Arrays are copied and checked once, at construction, and are read-only afterwards. Boolean indexing
+`rows[mask]` returns the same type. Nothing is ever None where an empty struct says the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from datetime import datetime
+from typing import Any, ClassVar, Literal, Protocol, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from standoff.core import homography
+from standoff.core.camera import Camera
+from standoff.core.homography import BoolArray, FloatArray
+
+IntArray = npt.NDArray[np.int64]
+ImageArray = npt.NDArray[np.uint8]
+TextArray = npt.NDArray[np.object_]
+
+
+class Picture(Protocol):
+    """The pixels of one frame, converted only when somebody asks, at the size that they ask for."""
+
+    @property
+    def width_px(self) -> int:
+        """Width, known without converting."""
+        ...
+
+    @property
+    def height_px(self) -> int:
+        """Height, known without converting."""
+        ...
+
+    def bgr(self) -> ImageArray:
+        """Return (H, W, 3) uint8, blue first; converted once and kept."""
+        ...
+
+    def resized_bgr(self, width_px: int, height_px: int) -> ImageArray:
+        """Return (height_px, width_px, 3) uint8, blue first, without making the full-size picture."""
+        ...
+
+    def gray(self) -> ImageArray:
+        """Return (H, W) uint8 luma; converted once and kept."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """One picture of one stream.
+
+    Attributes:
+        stream_id: Name of the stream.
+        index: Position in the source, counting every frame, also those that `every` skips.
+        time_s: Presentation timestamp, seconds from the start of the source.
+        captured_at: Aware UTC time of capture, or None when the source does not tell.
+        picture: The pixels.
+    """
+
+    stream_id: str
+    index: int
+    time_s: float
+    picture: Picture
+    captured_at: datetime | None = None
+
+    @property
+    def image(self) -> ImageArray:
+        """The full-size picture, (H, W, 3) uint8 BGR; asking for it converts it."""
+        return self.picture.bgr()
+
+    @property
+    def size_px(self) -> tuple[int, int]:
+        """(width, height), known without converting a pixel."""
+        return self.picture.width_px, self.picture.height_px
+
+
+class _Rows:
+    """Struct of arrays with one row per entity. Subclasses list their columns in `_COLUMNS`."""
+
+    __slots__ = ()
+    _COLUMNS: ClassVar[Mapping[str, tuple[type, tuple[int, ...]]]]
+
+    def __post_init__(self) -> None:
+        count: int | None = None
+        for name, (dtype, tail) in self._COLUMNS.items():
+            column: npt.NDArray[Any] = np.array(getattr(self, name), dtype=dtype)
+            if column.size == 0:
+                column = column.reshape(0, *tail)
+            if column.shape[1:] != tail or column.ndim != 1 + len(tail):
+                raise ValueError(f"{type(self).__name__}.{name} must be (N, {tail}), not {column.shape}")
+            if count is not None and len(column) != count:
+                raise ValueError(f"{type(self).__name__}.{name} has {len(column)} rows, the others {count}")
+            count = len(column)
+            column.setflags(write=False)
+            object.__setattr__(self, name, column)
+
+    def __len__(self) -> int:
+        return len(getattr(self, next(iter(self._COLUMNS))))
+
+    def __getitem__(self, mask: BoolArray | IntArray | slice) -> Self:
+        return replace(self, **{name: getattr(self, name)[mask] for name in self._COLUMNS})  # type: ignore[type-var]
+
+    @classmethod
+    def empty(cls) -> Self:
+        """Return a struct with no rows."""
+        return cls(**{name: np.zeros((0, *tail), dtype) for name, (dtype, tail) in cls._COLUMNS.items()})
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Detections(_Rows):
+    """What the detector saw in one frame.
+
+    Attributes:
+        xyxy_px: (N, 4) left, top, right, bottom edges in full-size picture pixels.
+        score: (N,) confidence, 0 to 1.
+        class_id: (N,) ids of `standoff.core.classes.CLASSES`.
+    """
+
+    xyxy_px: FloatArray
+    score: FloatArray
+    class_id: IntArray
+
+    _COLUMNS: ClassVar[Mapping[str, tuple[type, tuple[int, ...]]]] = {
+        "xyxy_px": (np.float64, (4,)),
+        "score": (np.float64, ()),
+        "class_id": (np.int64, ()),
+    }
+
+    def __post_init__(self) -> None:
+        _Rows.__post_init__(self)
+        if not np.isfinite(self.xyxy_px).all() or not np.isfinite(self.score).all():
+            raise ValueError("Detections must be finite")
+        if (self.xyxy_px[:, :2] > self.xyxy_px[:, 2:]).any():
+            raise ValueError("Detections.xyxy_px must be left, top, right, bottom")
+        if ((self.score < 0) | (self.score > 1)).any():
+            raise ValueError("Detections.score must lie between 0 and 1")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NoGroundMap:
+    """There is no ground map for this frame, and why. Falsy.
+
+    Attributes:
+        reason: A short clause, the same words for the same cause, so that causes can be counted.
+    """
+
+    reason: str
+
+    def __bool__(self) -> bool:
+        return False
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GroundMap:
+    """Where a pixel stands on the ground, and how sure that is. Truthy.
+
+    Attributes:
+        image_to_ground: (3, 3) signed homography from *undistorted* pixels to metres in the site frame
+            (x east, y north; or x along the reference's first edge, y to its left seen from above);
+            its denominator is positive in front of the camera.
+        covariance: (9, 9) of its entries, row by row, for the matrix as scaled here.
+        image_size_px: (width, height) of the pictures that it is for.
+        valid_px: (V, 2) polygon in undistorted pixels outside which it is not trusted; V = 0: no limit
+            but the horizon.
+        method: How it was found ("surveyed", "reference:paper", ...).
+        scale_m_per_px: Eq. 6's scale, reference_m / reference_px on the paper's rectified plane.
+        anchors_px: (A, 2) the points, as seen in the picture, that fixed it, for drawing.
+        camera: The lens whose distortion is removed from points first; None: points are used as they are.
+        age_s: Seconds since it was last observed; 0 when observed in this frame.
+    """
+
+    image_to_ground: FloatArray
+    covariance: FloatArray
+    image_size_px: tuple[int, int]
+    method: str
+    scale_m_per_px: float
+    valid_px: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
+    anchors_px: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
+    camera: Camera | None = None
+    age_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        shapes = {"image_to_ground": (3, 3), "covariance": (9, 9), "valid_px": (-1, 2), "anchors_px": (-1, 2)}
+        for name, shape in shapes.items():
+            array = np.array(getattr(self, name), dtype=np.float64).reshape(shape)
+            if not np.isfinite(array).all():
+                raise ValueError(f"GroundMap.{name} must be finite")
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+
+    def __bool__(self) -> bool:
+        return True
+
+    def undistorted(self, points_px: FloatArray) -> FloatArray:
+        """Return (N, 2) picture points without the lens distortion; NaN where the lens has no inverse."""
+        points_px = np.asarray(points_px, dtype=np.float64).reshape(-1, 2)
+        return points_px if self.camera is None else self.camera.undistort(points_px)
+
+    def to_ground(self, points_px: FloatArray) -> tuple[FloatArray, BoolArray]:
+        """Map (N, 2) picture points to (N, 2) metres; NaN and False beyond the horizon."""
+        return homography.apply(self.image_to_ground, self.undistorted(points_px))
+
+    def to_image(self, points_m: FloatArray) -> tuple[FloatArray, BoolArray]:
+        """Map (N, 2) metres to (N, 2) picture points, lens distortion included; NaN behind the camera."""
+        points_px, valid = homography.apply(homography.invert(self.image_to_ground), points_m)
+        return (points_px if self.camera is None else self.camera.distort(points_px)), valid
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tracks(_Rows):
+    """Entities followed over time, as they are in one frame.
+
+    Attributes:
+        track_id: (M,) unique in its stream and never used again.
+        xyxy_px: (M, 4) filtered box; predicted where not observed.
+        score: (M,) of the last detection.
+        class_id: (M,) ids of `CLASSES`.
+        observed: (M,) False where the track coasts: no detection supports it in this frame.
+        age_s: (M,) seconds since the track was first seen.
+    """
+
+    track_id: IntArray
+    xyxy_px: FloatArray
+    score: FloatArray
+    class_id: IntArray
+    observed: BoolArray
+    age_s: FloatArray
+
+    _COLUMNS: ClassVar[Mapping[str, tuple[type, tuple[int, ...]]]] = {
+        "track_id": (np.int64, ()),
+        "xyxy_px": (np.float64, (4,)),
+        "score": (np.float64, ()),
+        "class_id": (np.int64, ()),
+        "observed": (np.bool_, ()),
+        "age_s": (np.float64, ()),
+    }
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GroundPositions(_Rows):
+    """Where each track stands; row i belongs to row i of the tracks it was made from.
+
+    Attributes:
+        track_id: (M,).
+        class_id: (M,) ids of `CLASSES`.
+        xy_m: (M, 2) site frame; NaN where invalid.
+        velocity_mps: (M, 2) site frame; NaN while unknown.
+        covariance_m2: (M, 2, 2) of xy_m, the map's share included; NaN where invalid.
+        map_factor_m: (M, 2, 9) the map's share F: covariance F_i F_i^T, and F_i F_j^T between two entities,
+            because all of a frame's positions lean on the same map; NaN where invalid.
+        radius_m: (M,) action radius.
+        valid: (M,).
+        reason: (M,) text; empty where valid.
+    """
+
+    track_id: IntArray
+    class_id: IntArray
+    xy_m: FloatArray
+    velocity_mps: FloatArray
+    covariance_m2: FloatArray
+    map_factor_m: FloatArray
+    radius_m: FloatArray
+    valid: BoolArray
+    reason: TextArray
+
+    _COLUMNS: ClassVar[Mapping[str, tuple[type, tuple[int, ...]]]] = {
+        "track_id": (np.int64, ()),
+        "class_id": (np.int64, ()),
+        "xy_m": (np.float64, (2,)),
+        "velocity_mps": (np.float64, (2,)),
+        "covariance_m2": (np.float64, (2, 2)),
+        "map_factor_m": (np.float64, (2, 9)),
+        "radius_m": (np.float64, ()),
+        "valid": (np.bool_, ()),
+        "reason": (np.object_, ()),
+    }
+
+    def __post_init__(self) -> None:
+        _Rows.__post_init__(self)
+        if not np.isfinite(self.xy_m[self.valid]).all() or not np.isnan(self.xy_m[~self.valid]).all():
+            raise ValueError("GroundPositions.xy_m must be finite where valid and NaN where not")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Proximities(_Rows):
+    """Every configured pair of tracks in the frame, measured or not.
+
+    Attributes:
+        track_a: (K,) the smaller track id.
+        track_b: (K,) the larger one.
+        distance_m: (K,) centre to centre; NaN where either position is invalid: not measured.
+        gap_m: (K,) distance less both action radii; negative is a breach; NaN where not measured.
+        sigma_m: (K,) standard error of the distance; NaN where not measured.
+        closing_mps: (K,) > 0 approaching; NaN while unknown.
+        time_to_contact_s: (K,) until gap_m is 0 at this closing speed, 0 when breached, inf if it never is;
+            NaN while unknown.
+        filtered: (K,) True where the outlier filter replaced the distance.
+    """
+
+    track_a: IntArray
+    track_b: IntArray
+    distance_m: FloatArray
+    gap_m: FloatArray
+    sigma_m: FloatArray
+    closing_mps: FloatArray
+    time_to_contact_s: FloatArray
+    filtered: BoolArray
+
+    _COLUMNS: ClassVar[Mapping[str, tuple[type, tuple[int, ...]]]] = {
+        "track_a": (np.int64, ()),
+        "track_b": (np.int64, ()),
+        "distance_m": (np.float64, ()),
+        "gap_m": (np.float64, ()),
+        "sigma_m": (np.float64, ()),
+        "closing_mps": (np.float64, ()),
+        "time_to_contact_s": (np.float64, ()),
+        "filtered": (np.bool_, ()),
+    }
+
+    def __post_init__(self) -> None:
+        _Rows.__post_init__(self)
+        if (self.track_a >= self.track_b).any():
+            raise ValueError("Proximities.track_a must be smaller than track_b")
+
+
+Severity = Literal["warning", "danger", "unknown"]
+Phase = Literal["opened", "updated", "closed", "unknown"]
+
+
+@dataclass(frozen=True, slots=True)
+class Hazard:
+    """One event in the life of a hazard; all events of one hazard share `hazard_id`.
+
+    Attributes:
+        hazard_id: ULID.
+        rule: "proximity", or "measurement" when the stream as a whole cannot be measured.
+        severity: Of the hazard at this event; "unknown" when it was never measured.
+        phase: "opened" first, "closed" last; "unknown" while it cannot be measured.
+        track_ids: The pair, smaller id first; empty for rule "measurement".
+        time_s: Presentation timestamp.
+        distance_m: Centre to centre; NaN while unknown.
+        gap_m: Distance less both action radii; NaN while unknown.
+        sigma_m: Standard error of the distance; NaN while unknown.
+        reason: Why it is unknown or why it closed; empty otherwise.
+    """
+
+    hazard_id: str
+    rule: str
+    severity: Severity
+    phase: Phase
+    track_ids: tuple[int, ...]
+    time_s: float
+    distance_m: float
+    gap_m: float
+    sigma_m: float
+    reason: str = ""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrameResult:
+    """Everything known of one frame: the only thing a sink or a service ever sees.
+
+    Attributes:
+        frame: The frame.
+        detections: Empty on frames where the detector rested.
+        detected: False on frames where the detector rested (`detect_every`).
+        ground: The map, or why there is none.
+        tracks: Live tracks.
+        positions: Row i belongs to track i.
+        proximities: All configured pairs.
+        hazards: The events of this frame, not the state.
+        stage_ms: Milliseconds spent in each stage on this frame.
+    """
+
+    frame: Frame
+    detections: Detections
+    detected: bool
+    ground: GroundMap | NoGroundMap
+    tracks: Tracks
+    positions: GroundPositions
+    proximities: Proximities
+    hazards: tuple[Hazard, ...]
+    stage_ms: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """How a run ended; sinks are closed with it.
+
+    Attributes:
+        status: "complete"; "interrupted" by the operator; "failed" with the source, the model or a stage.
+        message: One line; empty when complete.
+        sink_errors: Message of each sink that gave up during the run, by sink name.
+        details: Counts and texts that only the end of the run knows, for the record.
+    """
+
+    status: Literal["complete", "interrupted", "failed"]
+    message: str = ""
+    sink_errors: Mapping[str, str] = field(default_factory=dict)
+    details: Mapping[str, Any] = field(default_factory=dict)
+
+
+class Sink(Protocol):
+    """Something that writes results down."""
+
+    def write(self, result: FrameResult) -> None:
+        """Take one frame's result."""
+        ...
+
+    def close(self, outcome: Outcome) -> None:
+        """Finish what was written; called once, also after an interruption."""
+        ...

@@ -1,0 +1,1 @@
+"""The pipeline, one folder for each arrow; siblings never import each other."""
