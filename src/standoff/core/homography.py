@@ -19,7 +19,8 @@ BoolArray = npt.NDArray[np.bool_]
 
 
 def _denominators(matrix: FloatArray, points: FloatArray) -> FloatArray:
-    return points @ matrix[2, :2] + matrix[2, 2]
+    w: FloatArray = points @ matrix[2, :2] + matrix[2, 2]
+    return w
 
 
 def apply(matrix: FloatArray, points: FloatArray) -> tuple[FloatArray, BoolArray]:
@@ -59,7 +60,7 @@ def invert(matrix: FloatArray) -> FloatArray:
     Raises:
         numpy.linalg.LinAlgError: The matrix is singular.
     """
-    return np.linalg.inv(matrix)
+    return np.linalg.inv(np.asarray(matrix, dtype=np.float64))
 
 
 def signed(matrix: FloatArray, point_in_front: FloatArray) -> FloatArray:
