@@ -7,9 +7,9 @@ Arrays are copied and checked once, at construction, and are read-only afterward
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from datetime import datetime
-from typing import Any, ClassVar, Literal, Protocol, Self
+from typing import ClassVar, Literal, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +17,7 @@ import numpy.typing as npt
 from standoff.core import homography
 from standoff.core.camera import Camera
 from standoff.core.homography import BoolArray, FloatArray
+from standoff.core.rows import Columns, Rows
 
 IntArray = npt.NDArray[np.int64]
 ImageArray = npt.NDArray[np.uint8]
@@ -78,40 +79,8 @@ class Frame:
         return self.picture.width_px, self.picture.height_px
 
 
-class _Rows:
-    """Struct of arrays with one row per entity. Subclasses list their columns in `_COLUMNS`."""
-
-    __slots__ = ()
-    _COLUMNS: ClassVar[Mapping[str, tuple[type, tuple[int, ...]]]]
-
-    def __post_init__(self) -> None:
-        count: int | None = None
-        for name, (dtype, tail) in self._COLUMNS.items():
-            column: npt.NDArray[Any] = np.array(getattr(self, name), dtype=dtype)
-            if column.size == 0:
-                column = column.reshape(0, *tail)
-            if column.shape[1:] != tail or column.ndim != 1 + len(tail):
-                raise ValueError(f"{type(self).__name__}.{name} must be (N, {tail}), not {column.shape}")
-            if count is not None and len(column) != count:
-                raise ValueError(f"{type(self).__name__}.{name} has {len(column)} rows, the others {count}")
-            count = len(column)
-            column.setflags(write=False)
-            object.__setattr__(self, name, column)
-
-    def __len__(self) -> int:
-        return len(getattr(self, next(iter(self._COLUMNS))))
-
-    def __getitem__(self, mask: BoolArray | IntArray | slice) -> Self:
-        return replace(self, **{name: getattr(self, name)[mask] for name in self._COLUMNS})  # type: ignore[type-var]
-
-    @classmethod
-    def empty(cls) -> Self:
-        """Return a struct with no rows."""
-        return cls(**{name: np.zeros((0, *tail), dtype) for name, (dtype, tail) in cls._COLUMNS.items()})
-
-
 @dataclass(frozen=True, slots=True, eq=False)
-class Detections(_Rows):
+class Detections(Rows):
     """What the detector saw in one frame.
 
     Attributes:
@@ -124,14 +93,14 @@ class Detections(_Rows):
     score: FloatArray
     class_id: IntArray
 
-    _COLUMNS: ClassVar[Mapping[str, tuple[type, tuple[int, ...]]]] = {
+    _COLUMNS: ClassVar[Columns] = {
         "xyxy_px": (np.float64, (4,)),
         "score": (np.float64, ()),
         "class_id": (np.int64, ()),
     }
 
     def __post_init__(self) -> None:
-        _Rows.__post_init__(self)
+        Rows.__post_init__(self)
         if not np.isfinite(self.xyxy_px).all() or not np.isfinite(self.score).all():
             raise ValueError("Detections must be finite")
         if (self.xyxy_px[:, :2] > self.xyxy_px[:, 2:]).any():
@@ -211,7 +180,7 @@ class GroundMap:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Tracks(_Rows):
+class Tracks(Rows):
     """Entities followed over time, as they are in one frame.
 
     Attributes:
@@ -230,7 +199,7 @@ class Tracks(_Rows):
     observed: BoolArray
     age_s: FloatArray
 
-    _COLUMNS: ClassVar[Mapping[str, tuple[type, tuple[int, ...]]]] = {
+    _COLUMNS: ClassVar[Columns] = {
         "track_id": (np.int64, ()),
         "xyxy_px": (np.float64, (4,)),
         "score": (np.float64, ()),
@@ -241,7 +210,7 @@ class Tracks(_Rows):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class GroundPositions(_Rows):
+class GroundPositions(Rows):
     """Where each track stands; row i belongs to row i of the tracks it was made from.
 
     Attributes:
@@ -267,7 +236,7 @@ class GroundPositions(_Rows):
     valid: BoolArray
     reason: TextArray
 
-    _COLUMNS: ClassVar[Mapping[str, tuple[type, tuple[int, ...]]]] = {
+    _COLUMNS: ClassVar[Columns] = {
         "track_id": (np.int64, ()),
         "class_id": (np.int64, ()),
         "xy_m": (np.float64, (2,)),
@@ -280,13 +249,13 @@ class GroundPositions(_Rows):
     }
 
     def __post_init__(self) -> None:
-        _Rows.__post_init__(self)
+        Rows.__post_init__(self)
         if not np.isfinite(self.xy_m[self.valid]).all() or not np.isnan(self.xy_m[~self.valid]).all():
             raise ValueError("GroundPositions.xy_m must be finite where valid and NaN where not")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Proximities(_Rows):
+class Proximities(Rows):
     """Every configured pair of tracks in the frame, measured or not.
 
     Attributes:
@@ -310,7 +279,7 @@ class Proximities(_Rows):
     time_to_contact_s: FloatArray
     filtered: BoolArray
 
-    _COLUMNS: ClassVar[Mapping[str, tuple[type, tuple[int, ...]]]] = {
+    _COLUMNS: ClassVar[Columns] = {
         "track_a": (np.int64, ()),
         "track_b": (np.int64, ()),
         "distance_m": (np.float64, ()),
@@ -322,7 +291,7 @@ class Proximities(_Rows):
     }
 
     def __post_init__(self) -> None:
-        _Rows.__post_init__(self)
+        Rows.__post_init__(self)
         if (self.track_a >= self.track_b).any():
             raise ValueError("Proximities.track_a must be smaller than track_b")
 
@@ -373,7 +342,7 @@ class FrameResult:
         positions: Row i belongs to track i.
         proximities: All configured pairs.
         hazards: The events of this frame, not the state.
-        stage_ms: Milliseconds spent in each stage on this frame.
+        stage_ms: Milliseconds spent in each stage on this frame; sinks add theirs ("sinks.NAME") one after another.
     """
 
     frame: Frame
@@ -394,14 +363,14 @@ class Outcome:
     Attributes:
         status: "complete"; "interrupted" by the operator; "failed" with the source, the model or a stage.
         message: One line; empty when complete.
+        hazards: The closing events of hazards that were open when the stream ended.
         sink_errors: Message of each sink that gave up during the run, by sink name.
-        details: Counts and texts that only the end of the run knows, for the record.
     """
 
     status: Literal["complete", "interrupted", "failed"]
     message: str = ""
+    hazards: tuple[Hazard, ...] = ()
     sink_errors: Mapping[str, str] = field(default_factory=dict)
-    details: Mapping[str, Any] = field(default_factory=dict)
 
 
 class Sink(Protocol):

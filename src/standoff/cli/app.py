@@ -1,0 +1,55 @@
+"""Put the verbs together and turn errors into one line and an exit code."""
+
+from __future__ import annotations
+
+import logging
+import sys
+from typing import Annotated
+
+import typer
+
+from standoff import __version__
+from standoff.cli import bench, calibrate, config, doctor, evaluate, export, run
+from standoff.core.errors import StandoffError
+
+app = typer.Typer(
+    name="standoff",
+    help="Measure how close workers are to machines in a drone's video, in metres, and warn before somebody is struck.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+app.command("run")(run.run)
+app.command("export")(export.export)
+app.command("calibrate")(calibrate.calibrate)
+app.add_typer(evaluate.app, name="evaluate")
+app.add_typer(config.app, name="config")
+app.command("bench")(bench.bench)
+app.command("doctor")(doctor.doctor)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"standoff {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    logging.basicConfig(level=logging.WARNING, format="standoff: %(message)s")
+
+
+def main() -> None:
+    """Run the command line and exit."""
+    try:
+        app()
+    except StandoffError as error:
+        typer.echo(f"standoff: {error}", err=True)
+        sys.exit(2)
+    except KeyboardInterrupt:
+        typer.echo("standoff: interrupted.", err=True)
+        sys.exit(1)

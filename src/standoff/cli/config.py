@@ -1,0 +1,85 @@
+"""`standoff config show` and `standoff config check`."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterable, Iterator
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import Annotated, Any, get_args, get_type_hints
+
+import typer
+
+app = typer.Typer(help="Show or check the settings.", no_args_is_help=True)
+_ConfigOption = Annotated[Path | None, typer.Option("--config", help="Settings, YAML. Absent: the defaults.")]
+
+
+def _annotations(section: object) -> Iterator[tuple[str, str, str]]:
+    """Yield (name, meaning, bounds) of every setting of a section, pydantic model or plain dataclass."""
+    from pydantic import BaseModel
+    from typing_extensions import Doc
+
+    if isinstance(section, BaseModel):
+        for name, info in type(section).model_fields.items():
+            yield name, info.description or "", _bounds(info.metadata)
+    else:
+        assert is_dataclass(section)
+        hints = get_type_hints(type(section), include_extras=True)
+        for field in fields(section):
+            extras = get_args(hints[field.name])[1:]
+            meaning = next((extra.documentation for extra in extras if isinstance(extra, Doc)), "")
+            yield field.name, meaning, _bounds(extras)
+
+
+def _bounds(extras: Iterable[object]) -> str:
+    signs = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
+    return " and ".join(
+        f"{sign} {limit}"
+        for extra in extras
+        for name, sign in signs.items()
+        if (limit := getattr(extra, name, None)) is not None
+    )
+
+
+def _yaml_lines(section: object, indent: str = "") -> Iterator[str]:
+    """Yield a section as YAML in which every setting carries its meaning and bounds as a comment."""
+    import yaml
+    from pydantic import BaseModel, TypeAdapter
+
+    for name, meaning, bounds in _annotations(section):
+        comment = f"{meaning} [{bounds}]" if bounds else meaning
+        yield from textwrap.wrap(comment, 118, initial_indent=f"{indent}# ", subsequent_indent=f"{indent}# ")
+        value = getattr(section, name)
+        if isinstance(value, BaseModel) or is_dataclass(value):
+            yield f"{indent}{name}:"
+            yield from _yaml_lines(value, indent + "  ")
+        else:
+            plain = TypeAdapter(Any).dump_python(value, mode="json")
+            text = yaml.safe_dump(plain, default_flow_style=True, width=10_000).removesuffix("...\n").strip()
+            yield f"{indent}{name}: {text}"
+
+
+@app.command()
+def show(
+    config: _ConfigOption = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON, without the meanings.")] = False,
+) -> None:
+    """Print every setting with its value, meaning and bounds, as YAML that `run --config` reads."""
+    from standoff.cli.console import write_json
+    from standoff.config import load_settings, resolved
+
+    settings = load_settings(config)
+    if as_json:
+        write_json(resolved(settings), Path("-"))
+        return
+    typer.echo("\n".join(_yaml_lines(settings)))
+
+
+@app.command()
+def check(file: Annotated[Path, typer.Argument(help="Settings, YAML.", show_default=False)]) -> None:
+    """Check a settings file and everything that it points to: model, survey, camera, shapes."""
+    from standoff.config import build_pipeline, load_settings
+
+    settings = load_settings(file)
+    build_pipeline(settings, frames=())
+    typer.echo(f"{file}: all settings are valid, and the files that they name can be used.")

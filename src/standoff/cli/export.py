@@ -1,0 +1,33 @@
+"""`standoff export`: Darknet cfg and weights in, one ONNX file out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from standoff.core.errors import ConfigError
+
+
+def export(
+    cfg: Annotated[Path, typer.Option(help="Darknet .cfg.", show_default=False)],
+    weights: Annotated[Path, typer.Option(help="Darknet .weights.", show_default=False)],
+    names: Annotated[Path, typer.Option(help="Class names, one a line.", show_default=False)],
+    out: Annotated[Path, typer.Option(help="ONNX file to write.", show_default=False)],
+    size: Annotated[str | None, typer.Option(help="Input size, WxH. Absent: the cfg's.")] = None,
+) -> None:
+    """Turn a Darknet network (YOLOv3 and its family) into one self-describing ONNX file."""
+    from standoff.training import export_darknet
+
+    export_darknet(cfg, weights, names, _size(size), out)
+    typer.echo(f"wrote {out} ({out.stat().st_size / 1e6:.1f} MB)")
+
+
+def _size(text: str | None) -> tuple[int, int] | None:
+    if text is None:
+        return None
+    width, sign, height = text.lower().partition("x")
+    if not (sign and width.isdecimal() and height.isdecimal()):
+        raise ConfigError(expected="--size WxH", found=repr(text), fix="write for example --size 768x576")
+    return int(width), int(height)

@@ -1,0 +1,150 @@
+"""`standoff run`: a video in, distances, hazards, a film and a report out."""
+
+from __future__ import annotations
+
+import json
+import signal
+from pathlib import Path
+from time import monotonic
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+
+import typer
+
+from standoff.core.errors import ConfigError
+
+if TYPE_CHECKING:
+    from standoff.monitor import Run
+
+
+def _numbers(text: str, count: int, option: str) -> tuple[float, ...]:
+    try:
+        numbers = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        numbers = ()
+    if len(numbers) != count:
+        raise ConfigError(
+            expected=f"{count} numbers with commas for {option}", found=repr(text), fix="write for example 10,20,30,40"
+        )
+    return numbers
+
+
+def _ground_overrides(ground: str | None, box: str | None, camera: Path | None) -> dict[str, Any]:
+    """Translate `--ground`, `--reference-box` and `--camera` into settings."""
+    overrides: dict[str, Any] = {}
+    if ground is not None and ground.startswith("square:"):
+        overrides["reference"] = {"square_m": _numbers(ground.removeprefix("square:"), 1, "--ground square:SIDE")[0]}
+        overrides["survey"] = None
+    elif ground == "none":
+        overrides |= {"survey": None, "reference": None}
+    elif ground is not None:
+        overrides |= {"survey": ground, "reference": None}
+    if box is not None:
+        overrides.setdefault("reference", {})
+        if overrides["reference"] is None:
+            raise ConfigError(
+                expected="--reference-box together with a reference object",
+                found=f"--ground {ground}",
+                fix="use --ground square:SIDE, or describe the reference in the settings file",
+            )
+        overrides["reference"]["box_px"] = _numbers(box, 4, "--reference-box")
+    if camera is not None:
+        overrides["camera"] = str(camera)
+    return overrides
+
+
+def run(
+    source: Annotated[Path, typer.Argument(help="Video file, or a folder of pictures.", show_default=False)],
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the outputs.", show_default=False)],
+    config: Annotated[Path | None, typer.Option(help="Settings, YAML (see `standoff config show`).")] = None,
+    model: Annotated[Path | None, typer.Option(help="Detector, ONNX (see `standoff export`).")] = None,
+    ground: Annotated[
+        str | None,
+        typer.Option(help="survey.yaml (surveyed points), square:SIDE (a square reference, side in m), or none."),
+    ] = None,
+    reference_box: Annotated[
+        str | None, typer.Option(help="Box of the reference in the first frame: left,top,right,bottom px.")
+    ] = None,
+    camera: Annotated[Path | None, typer.Option(help="Camera file: removes lens distortion.")] = None,
+    start: Annotated[float | None, typer.Option(help="Begin here; s.")] = None,
+    stop: Annotated[float | None, typer.Option(help="End here; s.")] = None,
+    every: Annotated[int | None, typer.Option(help="Read every k-th frame only.")] = None,
+    fps: Annotated[float | None, typer.Option(help="Frames a second of a picture folder.")] = None,
+    detect_every: Annotated[int | None, typer.Option(help="Detect on every k-th frame; tracks coast between.")] = None,
+    outputs: Annotated[
+        str | None, typer.Option(help="What to write, with commas: tracks,proximity,frames,hazards,video,report.")
+    ] = None,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace an earlier run's files in the folder.")
+    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the run's record as JSON.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+) -> None:
+    """Monitor a video: distances in metres, hazards, an annotated film and a report."""
+    from standoff.config import load_settings
+    from standoff.monitor import RECORD, open_run
+
+    plain = {
+        "model": model,
+        "start_s": start,
+        "stop_s": stop,
+        "every": every,
+        "fps": fps,
+        "detect_every": detect_every,
+        "outputs": tuple(filter(None, outputs.split(","))) if outputs is not None else None,
+    }
+    overrides: dict[str, Any] = {name: value for name, value in plain.items() if value is not None}
+    if ground_overrides := _ground_overrides(ground, reference_box, camera):
+        overrides["ground"] = ground_overrides
+    opened = open_run(source, out, load_settings(config, overrides), overwrite=overwrite)
+    signal.signal(signal.SIGTERM, _interrupt)
+    try:
+        _watch(opened, quiet=quiet)
+    finally:
+        _tell(out / RECORD, as_json=as_json, quiet=quiet)
+    raise typer.Exit(_status(out / RECORD))
+
+
+def _interrupt(number: int, stack: object) -> NoReturn:
+    """End a run that is asked to terminate as one that is interrupted at the keyboard: with whole files."""
+    raise KeyboardInterrupt
+
+
+def _watch(opened: Run, *, quiet: bool) -> None:
+    from standoff.cli.console import progress_bar
+
+    with progress_bar(quiet=quiet) as bar:
+        task = bar.add_task("monitoring", total=opened.source.frame_count, rate=0.0)
+        started = monotonic()
+        for count, _ in enumerate(opened, start=1):
+            bar.update(task, completed=count, rate=count / (monotonic() - started))
+
+
+def _tell(record_file: Path, *, as_json: bool, quiet: bool) -> None:
+    """Print the record, or a summary of it."""
+    from standoff.cli.console import print_table, write_json
+
+    record = json.loads(record_file.read_text(encoding="utf-8"))
+    if as_json:
+        write_json(record, Path("-"))
+    elif not quiet:
+        counts, hazards = record["counts"], record["counts"]["hazards"]
+        rows = [
+            ("frames", f"{counts['frames']}"),
+            ("frames with a ground map", f"{counts['frames_with_map']}"),
+            ("tracks", f"{counts['tracks']}"),
+            ("distances measured", f"{counts['measured_distances']} of {counts['distances']}"),
+            ("hazards", ", ".join(f"{number} {name}" for name, number in hazards.items()) or "none"),
+            ("frames a second", f"{record['frames_per_s']}"),
+        ]
+        rows += [(f"no map: {reason}", f"{number}") for reason, number in counts["no_ground_map"].items()]
+        rows += [(f"output {name} failed", message) for name, message in record["sink_errors"].items()]
+        print_table(f"{record['status']}: {record_file.parent}", ("", ""), rows, record["message"])
+
+
+def _status(record_file: Path) -> int:
+    """Return 1 for a run that ended well but did not measure anything or lost an output."""
+    record = json.loads(record_file.read_text(encoding="utf-8"))
+    unmeasured = record["counts"]["frames_with_map"] == 0
+    if unmeasured:
+        typer.echo("standoff: no frame could be measured; the reasons are above and in run.json.", err=True)
+    return int(unmeasured or bool(record["sink_errors"]))

@@ -1,0 +1,76 @@
+"""What each stage must be able to do to stand in the pipeline; a replacement needs nothing more."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from standoff.core.types import (
+    Detections,
+    Frame,
+    GroundMap,
+    GroundPositions,
+    Hazard,
+    NoGroundMap,
+    Proximities,
+    Tracks,
+)
+
+AnyGround = GroundMap | NoGroundMap
+
+
+class Detector(Protocol):
+    """Find entities in a picture."""
+
+    def detect(self, frame: Frame) -> Detections:
+        """Return what is seen, in full-size picture pixels and the site's classes."""
+        ...
+
+
+class Ground(Protocol):
+    """Find out where a pixel stands on the ground."""
+
+    def update(self, frame: Frame, detections: Detections) -> AnyGround:
+        """Return the frame's map, or the reason why there is none."""
+        ...
+
+
+class Tracker(Protocol):
+    """Follow entities over time."""
+
+    def update(self, time_s: float, detections: Detections) -> Tracks:
+        """Return the live tracks after a frame on which the detector ran."""
+        ...
+
+    def coast(self, time_s: float) -> Tracks:
+        """Return the live tracks, all predicted, at a frame on which the detector rested."""
+        ...
+
+
+class Locator(Protocol):
+    """Place tracks on the ground."""
+
+    def update(self, time_s: float, tracks: Tracks, ground: AnyGround) -> GroundPositions:
+        """Return one row for each track, invalid ones included."""
+        ...
+
+
+class ProximityMeter(Protocol):
+    """Measure how close entities are."""
+
+    def update(self, time_s: float, positions: GroundPositions, ground: AnyGround) -> Proximities:
+        """Return one row for each configured pair, unmeasured ones included."""
+        ...
+
+
+class HazardMonitor(Protocol):
+    """Decide when somebody is in danger."""
+
+    def update(
+        self, time_s: float, positions: GroundPositions, proximities: Proximities, ground: AnyGround
+    ) -> tuple[Hazard, ...]:
+        """Return the events of this frame."""
+        ...
+
+    def close(self, time_s: float) -> tuple[Hazard, ...]:
+        """Return the closing events at the end of the stream."""
+        ...

@@ -1,0 +1,99 @@
+"""One run from a source to a folder of outputs: what `standoff run` does, for use from Python.
+
+    from standoff.config import load_settings
+    from standoff.monitor import open_run
+    for result in open_run("site.mp4", "out", load_settings(Path("site.yaml"))):
+        ...
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from standoff.config import Settings, build_pipeline, build_replacement, resolved
+from standoff.core.types import FrameResult, Sink
+from standoff.pipeline import Pipeline
+from standoff.stages.frames import Source, open_source
+from standoff.stages.sinks import (
+    FramesSink,
+    HazardSink,
+    ProximitySink,
+    RecordSink,
+    ReportSink,
+    TracksSink,
+    VideoSink,
+    prepare_output,
+)
+
+RECORD = "run.json"
+_LOG = logging.getLogger(__name__)
+
+
+@dataclass
+class Run:
+    """An opened run; iterate over it once, and it is done.
+
+    Attributes:
+        source: Where the frames come from.
+        pipeline: The stages.
+        folder: Where the outputs are.
+    """
+
+    source: Source
+    pipeline: Pipeline
+    folder: Path
+
+    def __iter__(self) -> Iterator[FrameResult]:
+        """Yield each frame's result once it is written."""
+        try:
+            yield from self.pipeline.run()
+        finally:
+            self.source.close()
+
+
+def open_run(source: Path | str, out: Path | str, settings: Settings, *, overwrite: bool = False) -> Run:
+    """Open the source, build the pipeline, then prepare the folder: nothing is written if anything is wrong.
+
+    Args:
+        source: Video file or folder of pictures.
+        out: Output folder; created.
+        settings: What to run.
+        overwrite: Replace the files of an earlier run in the folder.
+
+    Raises:
+        StandoffError: A source, model, survey, camera, setting or folder that cannot be used.
+    """
+    frames = open_source(
+        source, start_s=settings.start_s, stop_s=settings.stop_s, every=settings.every, fps=settings.fps
+    )
+    pipeline = build_pipeline(settings, frames)
+    descriptions = {
+        "settings": resolved(settings),
+        "source": frames.description,
+        "model": getattr(pipeline.detector, "description", None),
+        "ground": getattr(pipeline.ground, "description", None),
+    }
+    folder = prepare_output(out, overwrite=overwrite)
+    pipeline.sinks = build_sinks(settings, folder, frames, descriptions)
+    return Run(frames, pipeline, folder)
+
+
+def build_sinks(settings: Settings, folder: Path, frames: Source, descriptions: dict[str, Any]) -> dict[str, Sink]:
+    """Make the configured outputs, the record last, so that it times all others."""
+    makers: dict[str, Any] = {
+        "tracks": lambda: TracksSink(folder / "tracks.parquet", settings.tables),
+        "proximity": lambda: ProximitySink(folder / "proximity.parquet", settings.tables),
+        "frames": lambda: FramesSink(folder / "frames.parquet", settings.tables),
+        "hazards": lambda: HazardSink(folder / "hazards.jsonl"),
+        "video": lambda: VideoSink(folder / "annotated.mp4", settings.video),
+        "report": lambda: ReportSink(folder / "report.html", settings.report, descriptions),
+    }
+    sinks: dict[str, Sink] = {name: makers[name]() for name in settings.outputs}
+    for name, replacement in settings.extra_outputs.items():
+        sinks[name] = build_replacement(name, replacement)
+    sinks["record"] = RecordSink(folder / RECORD, descriptions)
+    return sinks

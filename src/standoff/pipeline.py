@@ -1,0 +1,109 @@
+"""The stages called in order; nothing else."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from time import perf_counter
+
+from standoff.core.protocols import Detector, Ground, HazardMonitor, Locator, ProximityMeter, Tracker
+from standoff.core.types import Detections, Frame, FrameResult, Hazard, Outcome, Sink
+
+_LOG = logging.getLogger(__name__)
+
+
+@contextmanager
+def _clocked(stage_ms: dict[str, float], stage: str) -> Iterator[None]:
+    start_s = perf_counter()
+    yield
+    stage_ms[stage] = (perf_counter() - start_s) * 1e3
+
+
+@dataclass
+class Pipeline:
+    """One stream's stages and their state.
+
+    Attributes:
+        frames: The source.
+        detector: Runs on every `detect_every`-th frame; tracks coast in between.
+        ground: Reads every frame.
+        sinks: By name. One that fails is logged and left out from then on; the others go on.
+        sink_errors: Message of each sink that failed.
+    """
+
+    frames: Iterable[Frame]
+    detector: Detector
+    ground: Ground
+    tracker: Tracker
+    locator: Locator
+    proximity: ProximityMeter
+    hazard: HazardMonitor
+    sinks: Mapping[str, Sink] = field(default_factory=dict)
+    detect_every: int = 1
+    sink_errors: dict[str, str] = field(default_factory=dict)
+
+    def run(self) -> Iterator[FrameResult]:
+        """Yield each frame's result after the sinks have it; close the sinks however the run ends."""
+        outcome, time_s, count = Outcome("complete"), 0.0, 0
+        try:
+            frames = iter(self.frames)
+            while True:
+                stage_ms: dict[str, float] = {}
+                with _clocked(stage_ms, "frames"):
+                    frame = next(frames, None)
+                if frame is None:
+                    break
+                time_s = frame.time_s
+                result = self.step(frame, stage_ms, detect=count % self.detect_every == 0)
+                self._write(result, stage_ms)
+                count += 1
+                yield result
+        except (KeyboardInterrupt, GeneratorExit):
+            outcome = Outcome("interrupted", "stopped before the end of the source")
+            raise
+        except BaseException as error:
+            outcome = Outcome("failed", str(error) or type(error).__name__)
+            raise
+        finally:
+            self._close(outcome, self.hazard.close(time_s))
+
+    def step(self, frame: Frame, stage_ms: dict[str, float], *, detect: bool = True) -> FrameResult:
+        """Take one frame through all stages; add each stage's milliseconds to `stage_ms`."""
+        detections = Detections.empty()
+        if detect:
+            with _clocked(stage_ms, "detect"):
+                detections = self.detector.detect(frame)
+        with _clocked(stage_ms, "ground"):
+            ground = self.ground.update(frame, detections)
+        with _clocked(stage_ms, "track"):
+            tracks = self.tracker.update(frame.time_s, detections) if detect else self.tracker.coast(frame.time_s)
+        with _clocked(stage_ms, "locate"):
+            positions = self.locator.update(frame.time_s, tracks, ground)
+        with _clocked(stage_ms, "proximity"):
+            proximities = self.proximity.update(frame.time_s, positions, ground)
+        with _clocked(stage_ms, "hazard"):
+            hazards = self.hazard.update(frame.time_s, positions, proximities, ground)
+        return FrameResult(frame, detections, detect, ground, tracks, positions, proximities, hazards, stage_ms)
+
+    def _write(self, result: FrameResult, stage_ms: dict[str, float]) -> None:
+        for name, sink in self.sinks.items():
+            if name in self.sink_errors:
+                continue
+            with _clocked(stage_ms, f"sinks.{name}"):
+                try:
+                    sink.write(result)
+                except Exception as error:  # noqa: BLE001 - a full disk must not stop the monitoring
+                    self._give_up(name, error)
+
+    def _close(self, outcome: Outcome, hazards: tuple[Hazard, ...]) -> None:
+        for name, sink in self.sinks.items():
+            try:
+                sink.close(Outcome(outcome.status, outcome.message, hazards, dict(self.sink_errors)))
+            except Exception as error:  # noqa: BLE001 - the other outputs must still be finished
+                self._give_up(name, error)
+
+    def _give_up(self, name: str, error: Exception) -> None:
+        _LOG.error("output %s stopped: %s", name, error)
+        self.sink_errors.setdefault(name, str(error) or type(error).__name__)

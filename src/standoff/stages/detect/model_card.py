@@ -1,0 +1,100 @@
+"""What a detector's ONNX file says about itself, written by the export and read by the detector.
+
+The metadata of the file holds one text a key: `standoff_format`, and as JSON `classes`, `anchors_px`,
+`input_size_px`, `preprocessing`, `output` and `sources`. The graph has one input and one output:
+
+- input `picture`: (1, 3, height, width) float32, RGB, 0 to 1, the picture letterboxed: scaled to fit without
+  changing its aspect ratio, in the middle, the rest 0.5 as in Darknet;
+- output `boxes`: (1, N, 5 + classes) float32: centre x, y, width, height in input pixels, where 0 is the left or
+  top edge of the first pixel; objectness; the probability of each class given an object.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+from standoff.core.errors import ModelError
+
+FORMAT: Final = "1"
+INPUT_NAME: Final = "picture"
+OUTPUT_NAME: Final = "boxes"
+PREPROCESSING: Final = {"colour": "RGB", "divide_by": 255, "letterbox_grey": 0.5}
+OUTPUT_COLUMNS: Final = ("centre_x_px", "centre_y_px", "width_px", "height_px", "objectness", "class probabilities")
+_FIX: Final = "make the file with `standoff export`"
+
+
+@dataclass(frozen=True, slots=True)
+class ModelCard:
+    """Facts about a detector.
+
+    Attributes:
+        classes: Labels in the order of the output's columns.
+        anchors_px: For each head its anchors' (width, height) in input pixels.
+        input_size_px: (width, height).
+        sources: SHA-256 of each file that the model was made from, by file name.
+    """
+
+    classes: tuple[str, ...]
+    anchors_px: tuple[tuple[tuple[float, float], ...], ...]
+    input_size_px: tuple[int, int]
+    sources: Mapping[str, str]
+
+    def to_metadata(self) -> dict[str, str]:
+        """Return the texts to put into the file's metadata."""
+        fields = {
+            "classes": self.classes,
+            "anchors_px": self.anchors_px,
+            "input_size_px": self.input_size_px,
+            "preprocessing": PREPROCESSING,
+            "output": OUTPUT_COLUMNS,
+            "sources": dict(self.sources),
+        }
+        return {"standoff_format": FORMAT, **{key: json.dumps(value) for key, value in fields.items()}}
+
+    @classmethod
+    def from_metadata(cls, metadata: Mapping[str, str], name: str) -> ModelCard:
+        """Read the card back.
+
+        Args:
+            metadata: The file's texts.
+            name: The file, for messages.
+
+        Raises:
+            ModelError: There is no card, its format or preprocessing is another, or it cannot be read.
+
+        >>> card = ModelCard(("worker",), (((4.0, 8.0),),), (64, 32), {})
+        >>> ModelCard.from_metadata(card.to_metadata(), "m.onnx") == card
+        True
+        """
+        if "standoff_format" not in metadata:
+            raise ModelError(
+                expected=f"a model exported by standoff at {name}", found="an ONNX file without its metadata", fix=_FIX
+            )
+        if metadata["standoff_format"] != FORMAT:
+            found = f"format '{metadata['standoff_format']}'"
+            raise ModelError(expected=f"model format {FORMAT} in {name}", found=found, fix=_FIX)
+        try:
+            return cls._from_fields({key: json.loads(metadata[key]) for key in _FIELDS}, name)
+        except (KeyError, TypeError, ValueError) as error:
+            raise ModelError(
+                expected=f"readable model metadata in {name}", found=f"{type(error).__name__}: {error}", fix=_FIX
+            ) from error
+
+    @classmethod
+    def _from_fields(cls, fields: dict[str, Any], name: str) -> ModelCard:
+        if fields["preprocessing"] != PREPROCESSING:
+            found = json.dumps(fields["preprocessing"])
+            raise ModelError(expected=f"preprocessing {json.dumps(PREPROCESSING)} in {name}", found=found, fix=_FIX)
+        width_px, height_px = (int(side) for side in fields["input_size_px"])
+        return cls(
+            classes=tuple(str(label) for label in fields["classes"]),
+            anchors_px=tuple(tuple((float(w), float(h)) for w, h in head) for head in fields["anchors_px"]),
+            input_size_px=(width_px, height_px),
+            sources={str(key): str(value) for key, value in fields["sources"].items()},
+        )
+
+
+_FIELDS: Final = ("classes", "anchors_px", "input_size_px", "preprocessing", "sources")

@@ -1,0 +1,72 @@
+"""Which parts of a frame the network looks at, one after another."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from standoff.core.homography import BoolArray, FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """A part of a frame, in whole pixels.
+
+    Attributes:
+        left_px: First column.
+        top_px: First row.
+        width_px: Columns.
+        height_px: Rows.
+        frame_size_px: (width, height) of the frame.
+    """
+
+    left_px: int
+    top_px: int
+    width_px: int
+    height_px: int
+    frame_size_px: tuple[int, int]
+
+    def is_cut(self, xyxy_px: FloatArray, margin_px: float) -> BoolArray:
+        """Tell which boxes end at a border of the view that is not a border of the frame.
+
+        Args:
+            xyxy_px: (N, 4) in frame pixels.
+            margin_px: How near to the border is at the border.
+
+        Returns:
+            (N,).
+        """
+        edges_px = np.array([self.left_px, self.top_px, self.left_px + self.width_px, self.top_px + self.height_px])
+        frame_edges_px = np.array([0, 0, *self.frame_size_px])
+        near = np.abs(xyxy_px - (edges_px - 0.5)) <= margin_px
+        cut: BoolArray = (near & (edges_px != frame_edges_px)).any(axis=1)
+        return cut
+
+
+def _starts_and_length(side_px: int, count: int, overlap: float) -> tuple[list[int], int]:
+    length_px = min(side_px, round(side_px / (count - (count - 1) * overlap)))
+    starts = np.rint(np.linspace(0, side_px - length_px, count)).astype(int)
+    return starts.tolist(), length_px
+
+
+def views(frame_size_px: tuple[int, int], slices: tuple[int, int], overlap: float) -> tuple[View, ...]:
+    """Lay a grid of overlapping slices over a frame.
+
+    Args:
+        frame_size_px: (width, height).
+        slices: Columns and rows.
+        overlap: Part of a slice's side that its neighbour shows too.
+
+    Returns:
+        The whole frame first, so that nothing is too large to be seen, then the slices, if any.
+
+    >>> [(view.left_px, view.width_px) for view in views((1800, 900), (2, 1), 0.2)]
+    [(0, 1800), (0, 1000), (800, 1000)]
+    """
+    whole = View(0, 0, *frame_size_px, frame_size_px)
+    if slices == (1, 1):
+        return (whole,)
+    lefts, width_px = _starts_and_length(frame_size_px[0], slices[0], overlap)
+    tops, height_px = _starts_and_length(frame_size_px[1], slices[1], overlap)
+    return whole, *(View(left, top, width_px, height_px, frame_size_px) for top in tops for left in lefts)

@@ -1,0 +1,164 @@
+"""Pictures that convert their pixels when asked: decoded ones (PyAV) and ready arrays (numpy)."""
+
+from __future__ import annotations
+
+import av
+import cv2
+import numpy as np
+
+from standoff.core.types import ImageArray
+
+_EIGHT_BIT_LUMA_FIRST = frozenset(
+    ["gray", "nv12", "nv21", "nv16"]
+    + [f"yuv{j}{layout}p" for j in ("", "j") for layout in ("410", "411", "420", "422", "440", "444")]
+)
+_FULL_RANGE = 2  # AVCOL_RANGE_JPEG
+_LIMITED_TO_FULL = np.clip(np.rint((np.arange(256) - 16) * (255 / 219)), 0, 255).astype(np.uint8)
+_LIMITED_TO_FULL.setflags(write=False)
+
+# rotation_deg is counter-clockwise, as PyAV tells it; -180 and 180 are the same.
+_TURNS = {
+    90: cv2.ROTATE_90_COUNTERCLOCKWISE,
+    -90: cv2.ROTATE_90_CLOCKWISE,
+    180: cv2.ROTATE_180,
+    -180: cv2.ROTATE_180,
+}
+
+
+def _read_only(image: ImageArray) -> ImageArray:
+    image.setflags(write=False)
+    return image
+
+
+def _gray_of(bgr: ImageArray) -> ImageArray:
+    gray: ImageArray = cv2.cvtColor(bgr, cv2.COLOR_BGR2GRAY)
+    return gray
+
+
+class AvPicture:
+    """A decoded video frame, upright; valid for as long as it is kept, whatever the decoder does next.
+
+    Args:
+        frame: The decoded `av.VideoFrame`, never changed.
+        rotation_deg: Counter-clockwise turn that makes it upright: 0, 90, -90, 180 or -180.
+    """
+
+    __slots__ = ("_bgr", "_frame", "_gray", "_rotation_deg")
+
+    def __init__(self, frame: av.VideoFrame, rotation_deg: int = 0) -> None:
+        if rotation_deg and rotation_deg not in _TURNS:
+            raise ValueError(f"rotation_deg must be 0, 90, -90, 180 or -180, not {rotation_deg}")
+        self._frame = frame
+        self._rotation_deg = rotation_deg
+        self._bgr: ImageArray | None = None
+        self._gray: ImageArray | None = None
+
+    def _lies_on_its_side(self) -> bool:
+        return abs(self._rotation_deg) == 90
+
+    def _upright(self, image: ImageArray) -> ImageArray:
+        if not self._rotation_deg:
+            return image
+        turned: ImageArray = cv2.rotate(image, _TURNS[self._rotation_deg])
+        return turned
+
+    @property
+    def width_px(self) -> int:
+        """Width once upright."""
+        return int(self._frame.height if self._lies_on_its_side() else self._frame.width)
+
+    @property
+    def height_px(self) -> int:
+        """Height once upright."""
+        return int(self._frame.width if self._lies_on_its_side() else self._frame.height)
+
+    def bgr(self) -> ImageArray:
+        """Return (H, W, 3) uint8, blue first, read-only; converted once and kept."""
+        if self._bgr is None:
+            self._bgr = _read_only(self._upright(self._frame.to_ndarray(format="bgr24")))
+        return self._bgr
+
+    def resized_bgr(self, width_px: int, height_px: int) -> ImageArray:
+        """Return (height_px, width_px, 3) uint8, blue first, scaled before it is converted.
+
+        Shrinking averages over areas, so that nothing aliases; enlarging interpolates linearly. At the
+        picture's own size it equals `bgr()`.
+        """
+        shrinks = width_px * height_px < self.width_px * self.height_px
+        wide, high = (height_px, width_px) if self._lies_on_its_side() else (width_px, height_px)
+        scaled = self._frame.reformat(
+            width=wide, height=high, format="bgr24", interpolation="AREA" if shrinks else "BILINEAR"
+        )
+        return self._upright(scaled.to_ndarray())
+
+    def gray(self) -> ImageArray:
+        """Return (H, W) uint8 luma, 0 black to 255 white, read-only; made once and kept.
+
+        Eight-bit YUV: the coded luma itself, stretched from 16..235 where the video says (or does not
+        deny) that it uses only those. It follows the video's own colour matrix, so that saturated
+        colours differ a little from OpenCV's gray, which is always BT.601. Other formats: from `bgr()`.
+        """
+        if self._gray is None:
+            coded = self._coded_luma()
+            self._gray = _read_only(_gray_of(self.bgr()) if coded is None else self._upright(coded))
+        return self._gray
+
+    def _coded_luma(self) -> ImageArray | None:
+        """Return the luma plane, black 0 and white 255, as it lies in the file; None where there is none."""
+        frame, plane = self._frame, self._frame.planes[0]
+        if frame.format.name not in _EIGHT_BIT_LUMA_FIRST or plane.line_size < 0:
+            return None
+        rows = np.frombuffer(plane, np.uint8)[: plane.line_size * frame.height].reshape(frame.height, plane.line_size)
+        coded = rows[:, : frame.width]
+        if frame.color_range == _FULL_RANGE or frame.format.name.startswith(("yuvj", "gray")):
+            return coded.copy()
+        stretched: ImageArray = cv2.LUT(coded, _LIMITED_TO_FULL)
+        return stretched
+
+
+class ArrayPicture:
+    """A picture that is already an array; copied, so that its maker may go on using it.
+
+    Args:
+        image: (H, W, 3) uint8, blue first.
+
+    >>> picture = ArrayPicture(np.zeros((4, 6, 3), np.uint8))
+    >>> picture.width_px, picture.gray().shape, picture.resized_bgr(3, 2).shape
+    (6, (4, 6), (2, 3, 3))
+    """
+
+    __slots__ = ("_bgr", "_gray")
+
+    def __init__(self, image: ImageArray) -> None:
+        if image.ndim != 3 or image.shape[2] != 3 or image.dtype != np.uint8 or image.size == 0:
+            raise ValueError(f"a picture must be (H, W, 3) uint8 BGR, not {image.shape} {image.dtype}")
+        self._bgr = _read_only(np.array(image, order="C"))
+        self._gray: ImageArray | None = None
+
+    @property
+    def width_px(self) -> int:
+        """Width."""
+        return int(self._bgr.shape[1])
+
+    @property
+    def height_px(self) -> int:
+        """Height."""
+        return int(self._bgr.shape[0])
+
+    def bgr(self) -> ImageArray:
+        """Return (H, W, 3) uint8, blue first, read-only."""
+        return self._bgr
+
+    def resized_bgr(self, width_px: int, height_px: int) -> ImageArray:
+        """Return (height_px, width_px, 3) uint8, blue first."""
+        shrinks = width_px * height_px < self.width_px * self.height_px
+        resized: ImageArray = cv2.resize(
+            self._bgr, (width_px, height_px), interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR
+        )
+        return resized
+
+    def gray(self) -> ImageArray:
+        """Return (H, W) uint8 luma (BT.601), read-only; converted once and kept."""
+        if self._gray is None:
+            self._gray = _read_only(_gray_of(self._bgr))
+        return self._gray

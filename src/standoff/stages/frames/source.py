@@ -1,0 +1,218 @@
+"""One door to all sources: open it, iterate once, get frames.
+
+A reader knows one kind of source (`video.py`, `folder.py`); `Source` adds what all kinds share: where to
+stop, the size that may not change, the stream's name and the time of capture. A live stream is a third
+reader.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from datetime import timedelta
+from itertools import chain
+from os import PathLike
+from pathlib import Path
+from types import TracebackType
+from typing import Any, NamedTuple, Self
+
+from standoff.core.errors import FrameSizeChanged, SourceError
+from standoff.core.types import Frame, ImageArray
+from standoff.stages.frames.folder import FolderReader
+from standoff.stages.frames.pictures import ArrayPicture
+from standoff.stages.frames.reader import TIME_ROUNDING_S, Reader, Shot
+from standoff.stages.frames.video import VideoReader
+
+
+class Selection(NamedTuple):
+    """Which part of a source is wanted.
+
+    Attributes:
+        start_s: First moment, seconds from the first picture.
+        stop_s: Moment before which it ends; None: the end.
+        every: 1: every picture from the start on, 2: every second one, ...
+    """
+
+    start_s: float = 0.0
+    stop_s: float | None = None
+    every: int = 1
+
+    def expected_of(self, total_frames: int | None, rate_fps: float) -> int | None:
+        """Return how many of a source's pictures are wanted, or None when that cannot be told.
+
+        Exact at a constant rate, an estimate at a variable one.
+
+        >>> Selection(start_s=1.0, stop_s=2.0, every=3).expected_of(100, 10.0)
+        4
+        """
+        if total_frames is None:
+            return None
+        first, last = 0, total_frames
+        if self.start_s > 0 or self.stop_s is not None:
+            if rate_fps <= 0:
+                return None
+            first = max(0, math.ceil((self.start_s - TIME_ROUNDING_S) * rate_fps))
+            if self.stop_s is not None:
+                last = min(last, math.ceil((self.stop_s - TIME_ROUNDING_S) * rate_fps))
+        return math.ceil(max(0, last - first) / self.every)
+
+    def check(self) -> None:
+        """Raise SourceError for a part that no source can have."""
+        if not (math.isfinite(self.start_s) and self.start_s >= 0):
+            raise SourceError(
+                expected="a start of 0 s or later", found=f"{self.start_s} s", fix="give seconds from the first picture"
+            )
+        if self.stop_s is not None and not self.stop_s > self.start_s:
+            raise SourceError(
+                expected=f"a stop after the start ({self.start_s} s)", found=f"{self.stop_s} s", fix="give a later stop"
+            )
+        if self.every < 1:
+            raise SourceError(expected="every 1 or more", found=str(self.every), fix="give 1 for every picture")
+
+
+class Source:
+    """An opened source; iterate over it once.
+
+    Args:
+        reader: What reads it; closed with the source.
+        selection: The part that is wanted.
+        stream_id: Name of the stream.
+
+    Attributes:
+        stream_id: Name of the stream.
+        size_px: (width, height) of every frame, upright.
+        frame_count: How many frames it should yield: exact for an image folder and at a constant frame
+            rate, an estimate at a variable one; None when the source does not tell.
+
+    Raises:
+        SourceError: The part that is wanted holds no picture.
+    """
+
+    def __init__(self, reader: Reader, selection: Selection, stream_id: str) -> None:
+        self.stream_id = stream_id
+        self.size_px = reader.size_px
+        self.frame_count = selection.expected_of(reader.total_frames, reader.rate_fps)
+        self._reader = reader
+        self._selection = selection
+        self._shots = self._wanted_shots()
+
+    def _wanted_shots(self) -> Iterator[Shot]:
+        shots = self._reader.shots(self._selection.start_s, self._selection.every)
+        first = next(shots, None)
+        stop_s = math.inf if self._selection.stop_s is None else self._selection.stop_s - TIME_ROUNDING_S
+        if first is None or first.time_s >= stop_s:
+            found = "none" if first is None else f"the first one at {first.time_s:.3f} s"
+            raise SourceError(
+                expected=f"pictures from {self._selection.start_s} s on",
+                found=found
+                if self._selection.stop_s is None
+                else f"{found}, to stop before {self._selection.stop_s} s",
+                fix=f"choose a start and a stop inside the source ({self._length()})",
+            )
+        return (shot for shot in _until(stop_s, chain([first], shots)))
+
+    def _length(self) -> str:
+        total, rate = self._reader.total_frames, self._reader.rate_fps
+        return f"it lasts about {total / rate:.1f} s" if total and rate else "its length is not declared"
+
+    def __iter__(self) -> Iterator[Frame]:
+        """Yield frames.
+
+        Raises:
+            FrameSizeChanged: A picture has another size than the first.
+            SourceTruncated: The source ended before its own header says it should; all its frames came first.
+            SourceError: A picture cannot be read, or has no usable time.
+        """
+        started_at = self._reader.started_at
+        for shot in self._shots:
+            size_px = (shot.picture.width_px, shot.picture.height_px)
+            if size_px != self.size_px:
+                raise FrameSizeChanged(
+                    expected="pictures of {}x{} as at the start".format(*self.size_px),
+                    found="{}x{} at {} ({:.2f} s)".format(*size_px, shot.label, shot.time_s),
+                    fix="give each size as a source of its own",
+                )
+            captured_at = None if started_at is None else started_at + timedelta(seconds=shot.time_s)
+            yield Frame(self.stream_id, shot.index, shot.time_s, shot.picture, captured_at)
+
+    @property
+    def description(self) -> dict[str, Any]:
+        """What it is and which part was wanted, for the record; counts grow while it is read."""
+        return {**self._reader.description, **self._selection._asdict(), "frames_expected": self.frame_count}
+
+    def close(self) -> None:
+        """Let go of the file; frames already yielded stay valid."""
+        self._shots = iter(())
+        self._reader.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def _until(stop_s: float, shots: Iterator[Shot]) -> Iterator[Shot]:
+    for shot in shots:
+        if shot.time_s >= stop_s:
+            return
+        yield shot
+
+
+def open_source(
+    path: str | PathLike[str],
+    *,
+    stream_id: str | None = None,
+    start_s: float = 0.0,
+    stop_s: float | None = None,
+    every: int = 1,
+    fps: float | None = None,
+) -> Source:
+    """Open a video file or a folder of images.
+
+    Frames carry the index that they have in the whole source, wherever it is started, and the time since
+    its first picture, from the presentation timestamps.
+
+    Args:
+        path: A video file (a single picture counts as one) or a folder that holds images only.
+        stream_id: Name of the stream; the file's or folder's name by default.
+        start_s: Begin with the first picture at or after this time.
+        stop_s: End before the first picture at or after this time.
+        every: Yield each `every`-th picture, the first one included.
+        fps: Pictures a second: needed for a folder, which has no clock. For a video it replaces its
+            timestamps by index / fps: only for files whose timestamps are missing or wrong.
+
+    Raises:
+        SourceError: It cannot be read, or is empty in the part that is wanted.
+        SourceTruncated: Its end, and with it the table of its pictures, is missing.
+    """
+    path = Path(path)
+    selection = Selection(start_s, stop_s, every)
+    selection.check()
+    if fps is not None and not (math.isfinite(fps) and fps > 0):
+        raise SourceError(expected="more than 0 pictures a second", found=str(fps), fix="give fps as a positive number")
+    if not path.exists():
+        raise SourceError(
+            expected="a video file or a folder of images", found=f"nothing at {path}", fix="check the path"
+        )
+    reader: Reader = FolderReader(path, fps) if path.is_dir() else VideoReader(path, fps)
+    try:
+        return Source(reader, selection, path.stem if stream_id is None else stream_id)
+    except SourceError:
+        reader.close()
+        raise
+
+
+def frame_from_array(image: ImageArray, *, index: int = 0, time_s: float = 0.0, stream_id: str = "array") -> Frame:
+    """Wrap an (H, W, 3) uint8 BGR picture, which is copied, as a frame.
+
+    Raises:
+        ValueError: The array has another shape or type.
+
+    >>> import numpy as np
+    >>> frame_from_array(np.zeros((4, 6, 3), np.uint8), time_s=0.5).size_px
+    (6, 4)
+    """
+    return Frame(stream_id, index, time_s, ArrayPicture(image))

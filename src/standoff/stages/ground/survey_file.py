@@ -1,0 +1,81 @@
+"""Survey files: image points with their positions on the ground, as YAML.
+
+    image_size_px: [768, 576]          # of the picture that the points were read from
+    points:                            # four or more, not on a line, spread over the ground that matters
+      - {name: kerb, px: [412.0, 310.5], m: [0.0, 0.0]}
+      - {name: manhole, px: [120.0, 400.0], m: [-4.2, 3.1]}
+      - ...
+    camera: camera.yaml                # optional: removes lens distortion; relative to this file
+    area_px: [[0, 200], [767, 200], [767, 575], [0, 575]]   # optional: where the map is to be trusted
+    point_sigma_px: 1.0                # optional: how well a point was read, one coordinate
+
+Pixels: the centre of the top-left pixel is (0, 0), x right, y down. Metres: x east, y north, or any other
+right-handed axes seen from above. Names are optional and only serve messages.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from standoff.core.camera import Camera
+from standoff.core.errors import GroundError
+from standoff.stages.ground.camera_file import load_camera
+from standoff.stages.ground.surveyed import SurveyedGround
+from standoff.stages.ground.yaml_file import check_keys, numbers, parse_mapping, read_text
+
+_WHAT = "a survey file"
+_KEYS = ("image_size_px", "points", "camera", "area_px", "point_sigma_px")
+
+
+def load_survey(path: Path | str, *, camera: Camera | None = None) -> SurveyedGround:
+    """Read a survey file and fit its map.
+
+    Args:
+        path: YAML as at this module's head.
+        camera: The lens; replaces the file's own.
+
+    Raises:
+        GroundError: The file is not a survey, or its points do not define a map.
+    """
+    path = Path(path)
+    content = parse_mapping(read_text(path, _WHAT), path, _WHAT)
+    check_keys(content, _KEYS, str(path))
+    points = _points(content, path)
+    if camera is None and content.get("camera") is not None:
+        camera = load_camera(path.parent / str(content["camera"]))
+    if "image_size_px" not in content:
+        fix = "add the width and height of the picture that the points were read from"
+        raise GroundError(expected="image_size_px in a survey file", found=f"{path} without it", fix=fix)
+    width_px, height_px = numbers(content["image_size_px"], (2,), f"image_size_px in {path}")
+    area_px = np.zeros((0, 2))
+    if content.get("area_px") is not None:
+        area_px = numbers(content["area_px"], (-1, 2), f"area_px in {path}")
+    sigma_px = numbers(content.get("point_sigma_px", 1.0), (), f"point_sigma_px in {path}")
+    return SurveyedGround(
+        [numbers(point.get("px"), (2,), f"px of {name!r} in {path}") for name, point in points.items()],
+        [numbers(point.get("m"), (2,), f"m of {name!r} in {path}") for name, point in points.items()],
+        (int(width_px), int(height_px)),
+        names=tuple(points),
+        camera=camera,
+        area_px=area_px,
+        point_sigma_px=float(sigma_px),
+    )
+
+
+def _points(content: Mapping[str, Any], path: Path) -> dict[str, Mapping[str, Any]]:
+    rows = content.get("points")
+    if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
+        fix = "write each as {name: kerb, px: [x, y], m: [x, y]}"
+        raise GroundError(expected="a list of points", found=f"none in {path}", fix=fix)
+    points: dict[str, Mapping[str, Any]] = {}
+    for number, row in enumerate(rows, start=1):
+        name = str(row.get("name", f"point {number}"))
+        check_keys(row, ("name", "px", "m"), f"{name!r} in {path}")
+        if name in points:
+            raise GroundError(expected="distinct names", found=f"{name!r} twice in {path}", fix="rename one")
+        points[name] = row
+    return points

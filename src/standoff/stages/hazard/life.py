@@ -1,0 +1,112 @@
+"""The two small machines that every hazard is made of: a latch against flicker and a life with one id."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from ulid import ULID
+
+from standoff.core.types import Hazard, Phase, Severity
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """One measurement of a pair; all NaN where there was none."""
+
+    distance_m: float
+    gap_m: float
+    sigma_m: float
+
+
+UNMEASURED = Reading(math.nan, math.nan, math.nan)
+
+
+class Latch:
+    """A switch that follows a condition only once it has held for some time.
+
+    Args:
+        on_after_s: It turns on when the condition to enter has held for so long.
+        off_after_s: It turns off when the condition to leave has held for so long.
+
+    >>> latch = Latch(on_after_s=0.5, off_after_s=0.0)
+    >>> for time_s in (0.0, 0.25, 0.5):
+    ...     latch.update(time_s, enters=True, leaves=False)
+    >>> latch.on
+    True
+    """
+
+    __slots__ = ("_off_after_s", "_on_after_s", "_since_s", "on")
+
+    def __init__(self, on_after_s: float, off_after_s: float) -> None:
+        self._on_after_s = on_after_s
+        self._off_after_s = off_after_s
+        self._since_s: float | None = None
+        self.on = False
+
+    @property
+    def stirred(self) -> bool:
+        """Whether it is on, or on its way to turn on."""
+        return self.on or self._since_s is not None
+
+    def update(self, time_s: float, *, enters: bool, leaves: bool) -> None:
+        """Take what holds now; neither holds between the two limits of a hysteresis."""
+        if not (leaves if self.on else enters):
+            self._since_s = None
+            return
+        if self._since_s is None:
+            self._since_s = time_s
+        if time_s - self._since_s >= (self._off_after_s if self.on else self._on_after_s):
+            self.on, self._since_s = not self.on, None
+
+    def miss(self) -> None:
+        """Take that nothing was measured: no step towards off, and no step back from on."""
+        if self.on:
+            self._since_s = None
+
+    def hold_on(self) -> None:
+        """Turn on without a measurement; only measurements turn it off again."""
+        self.on, self._since_s = True, None
+
+
+class OpenHazard:
+    """A hazard from its first event to its last, under one id.
+
+    Args:
+        rule: "proximity" or "measurement".
+        track_ids: The pair, smaller id first; empty for rule "measurement".
+        severity: To begin with.
+    """
+
+    __slots__ = ("_hazard_id", "_rule", "_said_s", "_track_ids", "measured", "reason", "severity")
+
+    def __init__(self, rule: str, track_ids: tuple[int, ...], severity: Severity) -> None:
+        self._hazard_id = str(ULID())
+        self._rule = rule
+        self._track_ids = track_ids
+        self._said_s = -math.inf
+        self.severity = severity
+        self.measured = False
+        self.reason = ""
+
+    def event(self, phase: Phase, time_s: float, reading: Reading = UNMEASURED, reason: str = "") -> Hazard:
+        """Say something about this hazard, and remember when it was said and whether it was measured then."""
+        self._said_s = time_s
+        self.measured = not math.isnan(reading.gap_m)
+        self.reason = reason
+        return Hazard(
+            hazard_id=self._hazard_id,
+            rule=self._rule,
+            severity=self.severity,
+            phase=phase,
+            track_ids=self._track_ids,
+            time_s=time_s,
+            distance_m=reading.distance_m,
+            gap_m=reading.gap_m,
+            sigma_m=reading.sigma_m,
+            reason=reason,
+        )
+
+    def silent_s(self, time_s: float) -> float:
+        """Return for how long nothing was said."""
+        return time_s - self._said_s

@@ -1,0 +1,54 @@
+"""Settings of the hazard stage."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from annotated_types import Ge
+from typing_extensions import Doc
+
+
+@dataclass(frozen=True, slots=True)
+class HazardParams:
+    """How near is too near, for how long, and when to say so.
+
+    The gap is the distance less both action radii, so it is danger when it is negative (the circles
+    touch) and a warning when it is less than the buffer.
+    """
+
+    buffer_m: Annotated[
+        float,
+        Ge(0),
+        Doc("Warn when the gap is less than so many metres; the paper's suggestion to absorb the measurement error."),
+    ] = 1.0
+    caution_sigmas: Annotated[
+        float,
+        Ge(0),
+        Doc("Take the gap to be smaller by so many of its standard errors; 0 takes it as measured, as the paper does."),
+    ] = 0.0
+    hysteresis_m: Annotated[
+        float,
+        Ge(0),
+        Doc("A level ends when the gap exceeds its limit by so many metres: noise of half a metre does not flicker."),
+    ] = 0.5
+    min_duration_s: Annotated[
+        float,
+        Ge(0),
+        Doc("A level must hold so many seconds before it is said: one bad frame is no alarm. 0 says it at once."),
+    ] = 0.2
+    release_s: Annotated[float, Ge(0), Doc("The gap must be wide enough for so many seconds before a level ends.")] = (
+        0.5
+    )
+    update_every_s: Annotated[
+        float, Ge(0), Doc("While a hazard lasts it is reported again every so many seconds, and at every change.")
+    ] = 1.0
+    unknown_after_s: Annotated[
+        float,
+        Ge(0),
+        Doc(
+            "A visible pair that was not near when last measured opens a hazard of unknown severity when it cannot be "
+            "measured for so many seconds: about what a walker needs to come into the picture whole."
+        ),
+    ] = 1.0
+    unknown_timeout_s: Annotated[
+        float, Ge(0), Doc("A hazard whose pair is no longer followed stays unknown for so many seconds, then closes.")
+    ] = 3.0

@@ -1,0 +1,152 @@
+"""Where each track stands on the ground, how sure that is, and how fast it moves."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from standoff.core import homography
+from standoff.core.classes import CLASSES
+from standoff.core.homography import BoolArray, FloatArray
+from standoff.core.types import GroundMap, GroundPositions, NoGroundMap, TextArray, Tracks
+from standoff.stages.locate.params import LocateParams
+from standoff.stages.locate.region import inside
+from standoff.stages.locate.uncertainty import factor, horizon_margin, own_covariance
+from standoff.stages.locate.velocity import VelocityEstimator
+
+CUT_OFF = "cut off by the picture's edge"
+OUTSIDE_LENS = "outside the lens model"
+BEYOND_HORIZON = "beyond the horizon"
+NEAR_HORIZON = "too near the horizon"
+OUTSIDE_MAP = "outside the ground map"
+
+
+class Locator:
+    """Place each track of one stream on the ground.
+
+    One point of the box stands for the entity and is taken to lie on the ground plane. For a machine
+    seen from above the bottom of the box is its near side, not its middle: the covariance covers the
+    error of the box, not this.
+
+    Args:
+        params: Settings; the defaults when left out.
+    """
+
+    def __init__(self, params: LocateParams | None = None) -> None:
+        self._params = params or LocateParams()
+        self._velocities = VelocityEstimator(self._params.velocity_window_s, self._params.velocity_min_span_s)
+        self._observed_s: dict[int, float] = {}
+        self._factored: tuple[GroundMap, FloatArray] | None = None
+        self._class_radius_m = np.array([self._params.radius_m.get(c.name, c.action_radius_m) for c in CLASSES])
+
+    def update(self, time_s: float, tracks: Tracks, ground: GroundMap | NoGroundMap) -> GroundPositions:
+        """Locate all tracks of one frame.
+
+        Args:
+            time_s: Presentation timestamp.
+            tracks: The live tracks; what is remembered of others is dropped.
+            ground: The frame's map, or why there is none.
+
+        Returns:
+            Row i belongs to track i. A row is invalid, with its reason, when there is no map, when the
+            box may go on outside the picture so that its anchor was not seen, and when the anchor is
+            outside the lens model, at or beyond the horizon, or outside the map's polygon. Velocity
+            comes from observed positions only, not from coasting ones, and is NaN where invalid.
+        """
+        coasted_s = self._coasted_s(time_s, tracks)
+        if isinstance(ground, NoGroundMap):
+            points_px = np.full((len(tracks), 2), np.nan)
+            xy_m = points_px.copy()
+            covariance_m2, map_factor_m = np.full((len(tracks), 2, 2), np.nan), np.full((len(tracks), 2, 9), np.nan)
+            reason = np.full(len(tracks), f"no ground map: {ground.reason}", dtype=object)
+        else:
+            points_px = ground.undistorted(self._anchors(tracks))
+            variance_px2 = self._anchor_variance(tracks, coasted_s)
+            root = self._root(ground)
+            reason = self._reasons(tracks, ground, points_px, horizon_margin(ground, root, points_px, variance_px2))
+            points_px = np.where((reason == "")[:, None], points_px, np.nan)
+            xy_m, _ = homography.apply(ground.image_to_ground, points_px)
+            map_factor_m = homography.parameter_jacobian(ground.image_to_ground, points_px) @ root
+            covariance_m2 = own_covariance(ground, points_px, variance_px2)
+            covariance_m2 += map_factor_m @ map_factor_m.transpose(0, 2, 1)
+        valid = np.isfinite(points_px).all(axis=1)
+        velocity_mps = self._velocities.update(time_s, tracks.track_id, xy_m, valid & tracks.observed)
+        velocity_mps[~valid] = np.nan
+        return GroundPositions(
+            track_id=tracks.track_id,
+            class_id=tracks.class_id,
+            xy_m=xy_m,
+            velocity_mps=velocity_mps,
+            covariance_m2=covariance_m2,
+            map_factor_m=map_factor_m,
+            radius_m=self._radii(tracks),
+            valid=valid,
+            reason=reason,
+        )
+
+    def reset(self) -> None:
+        """Forget all tracks."""
+        self._velocities.reset()
+        self._observed_s = {}
+        self._factored = None
+
+    def _coasted_s(self, time_s: float, tracks: Tracks) -> FloatArray:
+        """Return (M,) seconds since each track was last observed, and forget the tracks that are gone."""
+        self._observed_s = {
+            track: time_s if observed else self._observed_s.get(track, time_s)
+            for track, observed in zip(tracks.track_id.tolist(), tracks.observed.tolist(), strict=True)
+        }
+        return time_s - np.array([*self._observed_s.values()], dtype=np.float64)
+
+    def _anchors(self, tracks: Tracks) -> FloatArray:
+        left, top, right, bottom = tracks.xyxy_px.T
+        down = bottom if self._params.anchor == "bottom_centre" else (top + bottom) / 2.0
+        return np.column_stack([(left + right) / 2.0, down])
+
+    def _edge_sigma(self, tracks: Tracks) -> FloatArray:
+        """Return (M, 2) standard error in pixels of a vertical and of a horizontal edge of each box."""
+        sides_px = tracks.xyxy_px[:, 2:] - tracks.xyxy_px[:, :2]
+        return np.maximum(self._params.edge_sigma_fraction * sides_px, self._params.edge_sigma_floor_px)
+
+    def _anchor_variance(self, tracks: Tracks, coasted_s: FloatArray) -> FloatArray:
+        """Return (M, 2) variance of the anchor: a mean of two independent edges has half that of one."""
+        edges = np.array([2.0, 1.0 if self._params.anchor == "bottom_centre" else 2.0])
+        longer_px = (tracks.xyxy_px[:, 2:] - tracks.xyxy_px[:, :2]).max(axis=1, initial=0.0)
+        coasting = (self._params.coast_sigma_per_s * longer_px * coasted_s) ** 2
+        variance_px2: FloatArray = self._edge_sigma(tracks) ** 2 / edges + coasting[:, None]
+        return variance_px2
+
+    def _cut_off(self, tracks: Tracks, size_px: tuple[int, int]) -> BoolArray:
+        """Tell (M,) which boxes may go on outside the picture on a side that their anchor depends on."""
+        margin_px = np.maximum(self._edge_sigma(tracks), self._params.cut_off_margin_px)
+        # The outermost pixels have their centres on 0 and size - 1, their outer edges half a pixel further.
+        touches_low = tracks.xyxy_px[:, :2] < margin_px - 0.5
+        touches_high = tracks.xyxy_px[:, 2:] > np.array(size_px) - 0.5 - margin_px
+        cut_off: BoolArray = touches_low[:, 0] | touches_high.any(axis=1)
+        return cut_off if self._params.anchor == "bottom_centre" else cut_off | touches_low[:, 1]
+
+    def _reasons(self, tracks: Tracks, ground: GroundMap, points_px: FloatArray, margin: FloatArray) -> TextArray:
+        """Return (M,) why each track cannot be located, the first cause that applies; empty where it can."""
+        _, mapped = homography.apply(ground.image_to_ground, points_px)
+        causes = (
+            (self._cut_off(tracks, ground.image_size_px), CUT_OFF),
+            (~np.isfinite(points_px).all(axis=1), OUTSIDE_LENS),
+            (~mapped, BEYOND_HORIZON),
+            (margin < self._params.horizon_sigmas, NEAR_HORIZON),
+            (~inside(ground.valid_px, points_px) & (len(ground.valid_px) > 0), OUTSIDE_MAP),
+        )
+        reason = np.full(len(tracks), "", dtype=object)
+        for affected, text in reversed(causes):
+            reason[affected] = text
+        return reason
+
+    def _root(self, ground: GroundMap) -> FloatArray:
+        """Return the factor of the map's covariance; a fixed camera's map is factored once."""
+        if self._factored is None or self._factored[0] is not ground:
+            self._factored = (ground, factor(ground.covariance))
+        return self._factored[1]
+
+    def _radii(self, tracks: Tracks) -> FloatArray:
+        own = self._params.track_radius_m
+        by_class = self._class_radius_m[tracks.class_id]
+        pairs = zip(tracks.track_id.tolist(), by_class.tolist(), strict=True)
+        return np.array([own.get(track, radius_m) for track, radius_m in pairs], dtype=np.float64)

@@ -1,0 +1,61 @@
+"""Settings of the proximity stage."""
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from annotated_types import Ge, Gt, Len
+from typing_extensions import Doc
+
+from standoff.core.classes import CLASS_BY_NAME
+
+SIDES = ("person", "equipment", "any", *CLASS_BY_NAME)
+
+
+@dataclass(frozen=True, slots=True)
+class ProximityParams:
+    """Which pairs are measured and how outliers among the distances are treated."""
+
+    pairs: Annotated[
+        tuple[tuple[str, str], ...],
+        Len(1),
+        Doc(
+            "Which pairs of tracks are measured. Each side is a class name, or 'person' or 'equipment' for all classes "
+            "with that role, or 'any' for both roles. The order of the sides does not matter."
+        ),
+    ] = (("worker", "equipment"),)
+    outlier_filter: Annotated[
+        Literal["bounded", "paper", "off"],
+        Doc(
+            "'paper': a distance further than the threshold from the mean of the previous two estimates is replaced by "
+            "that mean, for ever if need be. 'bounded': the same, but what could really have moved so far is never "
+            "replaced, and a new level that lasts is accepted."
+        ),
+    ] = "bounded"
+    outlier_threshold_px: Annotated[
+        float | None, Gt(0), Doc("The paper's threshold, in pixels of its rectified plane (Eq. 6 makes metres of it).")
+    ] = 50.0
+    outlier_threshold_m: Annotated[
+        float | None,
+        Gt(0),
+        Doc("The threshold in metres, in place of the one in pixels. Without either nothing is an outlier."),
+    ] = None
+    max_speed_mps: Annotated[
+        float,
+        Ge(0),
+        Doc(
+            "'bounded' widens the threshold by this speed times the age of the estimates. The paper's loader moves "
+            "3.4 m in 0.278 s (section 8.3), a running worker some 3 m/s towards it."
+        ),
+    ] = 15.0
+    max_replaced_s: Annotated[
+        float,
+        Gt(0),
+        Doc(
+            "'bounded' forgets estimates older than so many seconds, and so replaces for no longer. Half a second "
+            "bridges a few bad frames and never hides a machine that has come closer."
+        ),
+    ] = 0.5
+
+    def __post_init__(self) -> None:
+        for side in {side for pair in self.pairs for side in pair} - set(SIDES):
+            raise ValueError(f"pairs: nothing is called {side!r}; there are {', '.join(SIDES)}")

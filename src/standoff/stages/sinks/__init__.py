@@ -1,0 +1,26 @@
+"""Results become files: tables, events, an annotated video, a report and a record of the run."""
+
+from standoff.stages.sinks.folder import OUTPUT_FILES, prepare_output
+from standoff.stages.sinks.hazards import HazardSink
+from standoff.stages.sinks.params import DrawParams, ReportParams, TableParams, VideoParams
+from standoff.stages.sinks.record import RecordSink
+from standoff.stages.sinks.tables import FRAMES, PROXIMITY, TRACKS, Table, TableSink
+from standoff.stages.sinks.video import Composer, VideoSink
+
+__all__ = [
+    "FRAMES",
+    "OUTPUT_FILES",
+    "PROXIMITY",
+    "TRACKS",
+    "Composer",
+    "DrawParams",
+    "HazardSink",
+    "RecordSink",
+    "ReportParams",
+    "Table",
+    "TableParams",
+    "TableSink",
+    "VideoParams",
+    "VideoSink",
+    "prepare_output",
+]

@@ -1,0 +1,149 @@
+"""The panel beside the camera's picture: the ground from above, with a scale bar."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from standoff.core.homography import FloatArray
+from standoff.core.types import GroundMap, ImageArray, NoGroundMap
+from standoff.stages.sinks.ground_window import GroundWindow, camera_up, rectify, seen_ground_m, window_around
+from standoff.stages.sinks.painter import Painter
+from standoff.stages.sinks.pair_lines import pair_lines
+from standoff.stages.sinks.palette import bgr
+from standoff.stages.sinks.params import DrawParams
+from standoff.stages.sinks.scene import Scene
+from standoff.stages.sinks.text import TextSprites
+
+_OUTSIDE_FOR_S = 2.0
+_DIMMED = 0.72
+_ANGLES = np.linspace(0.0, 2.0 * np.pi, 49)
+_CIRCLE = np.column_stack([np.cos(_ANGLES), np.sin(_ANGLES)])
+_SCALE_STEPS_M = np.array([0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000])
+
+
+class BirdsEye:
+    """Draw the rectified picture; its window stays where it is until a track has been outside for two seconds.
+
+    Args:
+        size_px: (width, height) of the panel.
+        params: What is drawn.
+        text: Where text comes from; share one between everything that draws.
+    """
+
+    def __init__(
+        self, size_px: tuple[int, int], params: DrawParams | None = None, text: TextSprites | None = None
+    ) -> None:
+        self._params = params or DrawParams()
+        self._text = text or TextSprites()
+        self._backdrop = _hatched(size_px)
+        self._window: GroundWindow | None = None
+        self._all_inside_at_s = -np.inf
+
+    def draw(self, panel: ImageArray, picture: ImageArray, scene: Scene) -> None:
+        """Draw one frame's panel.
+
+        Args:
+            panel: (height, width, 3) uint8 BGR, written to.
+            picture: The frame at any size, without drawings.
+            scene: What was measured.
+        """
+        panel[:] = self._backdrop
+        painter = Painter(panel, self._text)
+        if isinstance(scene.ground, NoGroundMap):
+            _write_centred(painter, panel, ("NO GROUND MAP", scene.ground.reason))
+            return
+        self._choose_window(scene, scene.ground)
+        if self._window is None:
+            _write_centred(painter, panel, ("NO GROUND IN SIGHT",))
+            return
+        rectify(picture, scene.ground, self._window, panel)
+        cv2.convertScaleAbs(panel, dst=panel, alpha=_DIMMED)
+        _draw_axes(painter, self._window)
+        _draw_scale_bar(painter, panel, self._window)
+        self._draw_entities(painter, scene, self._window)
+
+    def _choose_window(self, scene: Scene, ground: GroundMap) -> None:
+        placed = scene.positions.xy_m[scene.positions.valid]
+        if self._window is not None:
+            if self._window.covers(placed).all():
+                self._all_inside_at_s = scene.time_s
+            if scene.time_s - self._all_inside_at_s <= _OUTSIDE_FOR_S:
+                return
+        points = np.vstack([placed, seen_ground_m(ground)])
+        if len(points):
+            height, width = self._backdrop.shape[:2]
+            self._window = window_around(points, (width, height), camera_up(ground), margin_m=6.0)
+            self._all_inside_at_s = scene.time_s
+
+    def _draw_entities(self, painter: Painter, scene: Scene, window: GroundWindow) -> None:
+        tones = scene.track_tones()
+        at = window.to_window(scene.positions.xy_m)
+        observed = scene.tracks.observed
+        if self._params.circles:
+            for centre, radius_m, tone, seen in zip(at, scene.positions.radius_m, tones, observed, strict=True):
+                if not np.isfinite(centre).all():
+                    continue
+                outline = centre + radius_m / window.m_per_px * _CIRCLE
+                if tone in ("danger", "warning"):
+                    painter.fill(outline, bgr(tone), 0.2)
+                painter.line(outline, bgr(tone), dashed=not seen)
+        lines = [
+            line for line in pair_lines(scene, scene.feet_px(), self._params.line_within_m)
+            if np.isfinite(at[[line.row_a, line.row_b]]).all()
+        ]
+        for line in lines:
+            painter.cased_line(at[[line.row_a, line.row_b]], bgr(line.tone), dashed=line.dashed)
+        for centre, tone, seen in zip(at, tones, observed, strict=True):
+            painter.dot(centre, bgr(tone), hollow=not seen)
+        if self._params.labels:
+            _label_dots(painter, scene, at)
+
+
+def _label_dots(painter: Painter, scene: Scene, at_px: FloatArray) -> None:
+    for (x, y), track_id, tone in zip(at_px, scene.tracks.track_id.tolist(), scene.track_tones(), strict=True):
+        if np.isfinite(x):
+            width, height = painter.label_size_px(str(track_id))
+            gap = 6 + 2 * painter.stroke_px
+            corners = [(x + gap, y - height / 2), (x - gap - width, y - height / 2), (x - width / 2, y + gap)]
+            painter.label(str(track_id), corners, accent=bgr(tone), optional=True)
+
+
+def _hatched(size_px: tuple[int, int]) -> ImageArray:
+    """Return the ground that no camera sees: dark grey with thin diagonals."""
+    width, height = size_px
+    x, y = np.meshgrid(np.arange(width), np.arange(height))
+    stripes = ((x + y) % 14 < 2)[:, :, None]
+    return np.where(stripes, (50, 45, 41), (35, 31, 28)).astype(np.uint8)
+
+
+def _write_centred(painter: Painter, panel: ImageArray, lines: tuple[str, ...]) -> None:
+    height, width = panel.shape[:2]
+    for row, text in enumerate(lines):
+        text_width, text_height = painter.label_size_px(text, bold=row == 0)
+        corner = ((width - text_width) / 2, height / 2 + (row - len(lines) / 2) * 1.3 * text_height)
+        painter.label(text, [corner], accent=bgr("danger") if row == 0 else None, bold=row == 0)
+
+
+def _draw_scale_bar(painter: Painter, panel: ImageArray, window: GroundWindow) -> None:
+    height, width = panel.shape[:2]
+    longest_m = 0.4 * width * window.m_per_px
+    length_m = float(_SCALE_STEPS_M[max(0, np.searchsorted(_SCALE_STEPS_M, longest_m, side="right") - 1)])
+    margin = painter.font_px
+    left, right, bottom = margin, margin + length_m / window.m_per_px, height - margin
+    tick = painter.font_px / 3
+    bar = np.array([[left, bottom - tick], [left, bottom], [right, bottom], [right, bottom - tick]])
+    painter.cased_line(bar, bgr("light"))
+    painter.label(f"{length_m:g} m", [(left, bottom - tick - painter.label_size_px("0")[1] - 3)])
+
+
+def _draw_axes(painter: Painter, window: GroundWindow) -> None:
+    """Show where the site frame's x and y point, because the window is turned to the camera's view."""
+    arm = 2.2 * painter.font_px
+    corner = np.array([1.6 * arm, 1.6 * arm])
+    for axis, name in enumerate("xy"):
+        direction = window.ground_to_window[:2, axis] * window.m_per_px
+        tip = corner + arm * direction
+        painter.cased_line(np.vstack([corner, tip]), bgr("light"))
+        width, height = painter.label_size_px(name)
+        painter.label(name, [tuple(tip + 0.55 * painter.font_px * direction - (width / 2, height / 2))])

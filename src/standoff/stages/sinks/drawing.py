@@ -1,0 +1,162 @@
+"""Draw what was measured over the camera's picture."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from standoff.core.homography import FloatArray
+from standoff.core.types import GroundMap, ImageArray, NoGroundMap
+from standoff.stages.sinks.ground_shapes import GroundCircles
+from standoff.stages.sinks.pair_lines import PairLine, pair_lines
+from standoff.stages.sinks.painter import Painter
+from standoff.stages.sinks.palette import Tone, bgr
+from standoff.stages.sinks.params import DrawParams
+from standoff.stages.sinks.scene import Scene
+from standoff.stages.sinks.text import TextSprites
+
+_LEGEND: tuple[tuple[Tone, str], ...] = (
+    ("danger", "danger"),
+    ("warning", "warning"),
+    ("worker", "worker"),
+    ("machine", "machine"),
+    ("unknown", "unknown"),
+)
+
+
+class Overlay:
+    """Draw boxes, hazard circles, distance lines and labels.
+
+    Args:
+        params: What is drawn.
+        text: Where text comes from; share one between everything that draws.
+    """
+
+    def __init__(self, params: DrawParams | None = None, text: TextSprites | None = None) -> None:
+        self._params = params or DrawParams()
+        self._text = text or TextSprites()
+        self._circles = GroundCircles()
+
+    def draw(self, canvas: ImageArray, scene: Scene) -> None:
+        """Draw over a picture, in place.
+
+        Args:
+            canvas: (H, W, 3) uint8 BGR, the frame at any size.
+            scene: What was measured, in full-size pixels.
+        """
+        painter = Painter(canvas, self._text)
+        to_canvas = _Scale(canvas, scene)
+        tones = scene.track_tones()
+        feet = scene.feet_px()
+        lines = pair_lines(scene, feet, self._params.line_within_m)
+        if isinstance(scene.ground, NoGroundMap):
+            _draw_banner(painter, canvas, scene.ground.reason)
+        else:
+            _draw_anchors(painter, to_canvas, scene.ground)
+            if self._params.circles:
+                self._draw_circles(painter, to_canvas, scene, scene.ground, tones)
+        _draw_boxes(painter, to_canvas, scene, tones)
+        for line in lines:
+            ends = to_canvas(feet[[line.row_a, line.row_b]])
+            painter.cased_line(ends, bgr(line.tone), dashed=line.dashed)
+        for foot, tone, observed in zip(to_canvas(feet), tones, scene.tracks.observed, strict=True):
+            painter.dot(foot, bgr(tone), hollow=not observed)
+        _draw_status(painter, canvas, scene)
+        if self._params.legend:
+            _draw_legend(painter, canvas)
+        if self._params.labels:
+            for line in lines:
+                _label_line(painter, to_canvas(feet[[line.row_a, line.row_b]]), line)
+            _label_boxes(painter, to_canvas, scene, tones)
+
+    def _draw_circles(
+        self, painter: Painter, to_canvas: _Scale, scene: Scene, ground: GroundMap, tones: list[Tone]
+    ) -> None:
+        positions = scene.positions
+        outlines = self._circles.outlines_px(ground, positions.xy_m, positions.radius_m)
+        for runs, tone, observed in zip(outlines, tones, scene.tracks.observed, strict=True):
+            for run in runs:
+                outline = to_canvas(run)
+                if tone in ("danger", "warning"):
+                    painter.fill(outline, bgr(tone), 0.16)
+                painter.line(outline, bgr(tone), dashed=not observed)
+
+
+class _Scale:
+    """Full-size picture pixels to canvas pixels, pixel centres on whole numbers in both."""
+
+    def __init__(self, canvas: ImageArray, scene: Scene) -> None:
+        self._factor = np.array([canvas.shape[1] / scene.size_px[0], canvas.shape[0] / scene.size_px[1]])
+
+    def __call__(self, points_px: FloatArray) -> FloatArray:
+        scaled: FloatArray = (np.asarray(points_px).reshape(-1, 2) + 0.5) * self._factor - 0.5
+        return scaled
+
+
+def _draw_banner(painter: Painter, canvas: ImageArray, reason: str) -> None:
+    height, width = canvas.shape[:2]
+    bar = canvas[: round(2.4 * painter.font_px)]
+    bar[:] = (bar * 0.12 + np.array(bgr("danger")) * 0.7).astype(np.uint8)
+    painter.reserve((0, 0, width, len(bar)))
+    painter.title(f"NO MEASUREMENT: {reason}", (painter.font_px, round(0.6 * painter.font_px)))
+    painter.box(np.array([1, 1, width - 2, height - 2]), bgr("danger"))
+
+
+def _draw_anchors(painter: Painter, to_canvas: _Scale, ground: GroundMap) -> None:
+    if not len(ground.anchors_px):
+        return
+    anchors = to_canvas(ground.anchors_px)
+    if len(anchors) == 4:
+        painter.cased_line(np.vstack([anchors, anchors[:1]]), bgr("reference"), dashed=ground.age_s > 0)
+    for anchor in anchors:
+        painter.dot(anchor, bgr("reference"), hollow=ground.age_s > 0)
+
+
+def _draw_boxes(painter: Painter, to_canvas: _Scale, scene: Scene, tones: list[Tone]) -> None:
+    corners = to_canvas(scene.tracks.xyxy_px).reshape(-1, 4)
+    for xyxy, tone, observed in zip(corners, tones, scene.tracks.observed, strict=True):
+        painter.box(xyxy, bgr(tone), dashed=not observed)
+
+
+def _label_line(painter: Painter, ends_px: FloatArray, line: PairLine) -> None:
+    width, height = painter.label_size_px(line.text, bold=True)
+    along = ends_px[1] - ends_px[0]
+    spots = [ends_px[0] + share * along for share in (0.5, 0.35, 0.65)]
+    on_line = [(x - width / 2, y - height / 2) for x, y in spots]
+    beside = [(x - width / 2, y + sign * 1.2 * height - height / 2) for x, y in spots for sign in (1, -1)]
+    is_short = float(np.linalg.norm(along)) < 1.5 * width
+    corners = beside + on_line if is_short else on_line + beside
+    painter.label(line.text, corners, accent=bgr(line.tone), bold=True, optional=line.tone == "light")
+
+
+def _label_boxes(painter: Painter, to_canvas: _Scale, scene: Scene, tones: list[Tone]) -> None:
+    corners = to_canvas(scene.tracks.xyxy_px).reshape(-1, 4)
+    graveness = {"danger": 0, "warning": 1, "unknown": 2}
+    names = list(scene.names().values())
+    has_map = isinstance(scene.ground, GroundMap)
+    for i in sorted(range(len(tones)), key=lambda row: graveness.get(tones[row], 3)):
+        unplaced = has_map and not scene.positions.valid[i]
+        text = f"{names[i]}: {scene.positions.reason[i] or 'no position'}" if unplaced else names[i]
+        x1, y1, x2, y2 = corners[i]
+        width, height = painter.label_size_px(text)
+        places = [(x1, y1 - height - 2), (x1, y2 + 2), (x2 + 2, y1), (x1 - width - 2, y1), (x2 - width, y1 - height - 2)]
+        painter.label(text, places, accent=bgr(tones[i]), optional=tones[i] in ("worker", "machine", "reference"))
+
+
+def _draw_status(painter: Painter, canvas: ImageArray, scene: Scene) -> None:
+    minutes, seconds = divmod(scene.time_s, 60.0)
+    text = f"{int(minutes):02d}:{seconds:06.3f}   frame {scene.frame_index}"
+    if isinstance(scene.ground, GroundMap):
+        age = f", {scene.ground.age_s:.1f} s old" if scene.ground.age_s > 0 else ""
+        text += f"   map: {scene.ground.method}{age}"
+    margin = painter.font_px // 2
+    painter.label(text, [(margin, canvas.shape[0] - painter.label_size_px(text)[1] - margin)])
+
+
+def _draw_legend(painter: Painter, canvas: ImageArray) -> None:
+    margin = painter.font_px // 2
+    right = canvas.shape[1] - margin
+    for tone, text in reversed(_LEGEND):
+        width, height = painter.label_size_px(text)
+        right -= width
+        painter.label(text, [(right, canvas.shape[0] - height - margin)], accent=bgr(tone))
+        right -= margin // 2

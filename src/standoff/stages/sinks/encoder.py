@@ -1,0 +1,114 @@
+"""An MP4 file that can be played whenever the process dies: H.264 in fragments."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import av
+import cv2
+
+from standoff.core.errors import MissingDependency
+from standoff.core.types import ImageArray
+from standoff.stages.sinks.folder import partial_path
+
+_TIME_BASE = Fraction(1, 90_000)
+_KEYFRAME_EVERY_S = 2.0
+_ENCODERS = ("libx264", "libopenh264", "mpeg4")
+_NOMINAL_FPS = 30
+
+
+class VideoFile:
+    """Write pictures with their times.
+
+    While it grows the file consists of fragments of two seconds, each readable as soon as it is written.
+    `close` rewrites it, without encoding again, as a plain MP4 with its index at the front, which every
+    player can seek in; the name points to a readable file at any time.
+
+    Args:
+        path: The file.
+        size_px: (width, height), both even.
+        crf: x264's rate factor; other encoders get a bit rate of similar quality.
+        preset: x264's preset.
+
+    Raises:
+        MissingDependency: This build of PyAV has no encoder for MP4.
+    """
+
+    def __init__(self, path: Path, size_px: tuple[int, int], *, crf: int, preset: str) -> None:
+        self._path = path
+        encoder = available_encoder()
+        options = {"movflags": "frag_keyframe+empty_moov+default_base_moof", "flush_packets": "1"}
+        self._container = av.open(str(path), "w", format="mp4", options=options)
+        self._stream = self._container.add_stream(encoder, rate=_NOMINAL_FPS)
+        self._stream.width, self._stream.height = size_px
+        self._stream.pix_fmt = "yuv420p"
+        self._stream.codec_context.time_base = _TIME_BASE
+        # without B-frames each fragment holds all of its pictures, and presentation times need no shift
+        self._stream.codec_context.max_b_frames = 0
+        if encoder == "libx264":
+            self._stream.options = {"crf": str(crf), "preset": preset}
+        else:
+            self._stream.bit_rate = int(size_px[0] * size_px[1] * _NOMINAL_FPS * 0.1)
+        self._last_ticks = -1
+        self._keyframe_ticks: int | None = None
+
+    def write(self, picture: ImageArray, time_s: float) -> None:
+        """Encode a picture.
+
+        Args:
+            picture: (height, width, 3) uint8 BGR of the file's size.
+            time_s: When it is shown, from the start of the file; moved on by one tick where it does not increase.
+        """
+        ticks = max(round(time_s / _TIME_BASE), self._last_ticks + 1)
+        frame = av.VideoFrame.from_ndarray(cv2.cvtColor(picture, cv2.COLOR_BGR2YUV_I420), format="yuv420p")
+        frame.pts, frame.time_base = ticks, _TIME_BASE
+        frame.duration = ticks - self._last_ticks if self._last_ticks >= 0 else round(1 / _NOMINAL_FPS / _TIME_BASE)
+        if self._keyframe_ticks is None or ticks - self._keyframe_ticks >= _KEYFRAME_EVERY_S / _TIME_BASE:
+            frame.pict_type = av.video.frame.PictureType.I
+            self._keyframe_ticks = ticks
+        self._last_ticks = ticks
+        self._container.mux(self._stream.encode(frame))
+
+    def close(self) -> None:
+        """Finish the file."""
+        self._container.mux(self._stream.encode(None))
+        self._container.close()
+        partial = partial_path(self._path)
+        try:
+            _rewrite(self._path, partial)
+            partial.replace(self._path)
+        finally:
+            partial.unlink(missing_ok=True)
+
+
+def available_encoder() -> str:
+    """Return the best MP4 video encoder that this build of PyAV has.
+
+    Raises:
+        MissingDependency: It has none.
+    """
+    for name in _ENCODERS:
+        try:
+            av.Codec(name, "w")
+        except av.codec.codec.UnknownCodecError:
+            continue
+        return name
+    raise MissingDependency(
+        expected=f"one of the video encoders {', '.join(_ENCODERS)}",
+        found="none of them in this build of PyAV",
+        fix="install PyAV from its wheel (pip install --force-reinstall av) or switch the annotated video off",
+    )
+
+
+def _rewrite(fragmented: Path, whole: Path) -> None:
+    with av.open(str(fragmented)) as source, av.open(
+        str(whole), "w", format="mp4", options={"movflags": "faststart"}
+    ) as target:
+        stream: Any = source.streams.video[0]
+        copied = target.add_stream_from_template(stream)
+        for packet in source.demux(stream):
+            if packet.dts is not None:
+                packet.stream = copied
+                target.mux(packet)

@@ -1,0 +1,97 @@
+"""The output folder: which files are ours, and whether it can be used."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from pathlib import Path
+
+from standoff.core.errors import OutputError
+
+OUTPUT_FILES: tuple[str, ...] = (
+    "run.json",
+    "tracks.parquet",
+    "proximity.parquet",
+    "frames.parquet",
+    "hazards.jsonl",
+    "annotated.mp4",
+    "report.html",
+)
+"""Every file that a run can write, by its final name."""
+
+
+def parts_folder(path: Path) -> Path:
+    """Return where the parts of a table are kept while the run goes on, or after it was killed.
+
+    >>> parts_folder(Path("out/tracks.parquet")).name
+    'tracks.parts'
+    """
+    return path.with_suffix(".parts")
+
+
+def partial_path(path: Path) -> Path:
+    """Return the name of a file that is not whole yet; beside the final name, so that a rename is atomic.
+
+    >>> partial_path(Path("out/run.json")).name
+    '.run.json.partial'
+    """
+    return path.with_name(f".{path.name}.partial")
+
+
+def _traces(folder: Path) -> list[Path]:
+    finals = [folder / name for name in OUTPUT_FILES]
+    unfinished = [parts_folder(path) for path in finals if path.suffix == ".parquet"]
+    unfinished += [partial_path(path) for path in finals]
+    return [path for path in finals + unfinished if path.exists() or path.is_symlink()]
+
+
+def prepare_output(path: Path | str, *, overwrite: bool = False) -> Path:
+    """Create the output folder and make sure that a run can be written to it.
+
+    Args:
+        path: The folder; parents are created.
+        overwrite: Remove the files of an earlier run first; files that are not ours are left alone.
+
+    Returns:
+        The folder.
+
+    Raises:
+        OutputError: It is a file, cannot be created or written to, or already holds a run.
+    """
+    folder = Path(path)
+    if folder.exists() and not folder.is_dir():
+        raise OutputError(expected="an output folder", found=f"the file {folder}", fix="choose another folder")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile(dir=folder, prefix=".writable-"):
+            pass
+    except OSError as error:
+        raise OutputError(
+            expected="an output folder that can be written to",
+            found=f"{folder} ({error.strerror or error})",
+            fix="choose another folder or make room and give write permission",
+        ) from error
+    earlier = _traces(folder)
+    if earlier and not overwrite:
+        raise OutputError(
+            expected="an output folder without a run in it",
+            found=f"{', '.join(trace.name for trace in earlier)} in {folder}",
+            fix="choose another folder or pass --overwrite",
+        )
+    for trace in earlier:
+        _remove(trace)
+    return folder
+
+
+def _remove(trace: Path) -> None:
+    try:
+        if trace.is_dir() and not trace.is_symlink():
+            shutil.rmtree(trace)
+        else:
+            trace.unlink()
+    except OSError as error:
+        raise OutputError(
+            expected="an earlier run that can be removed",
+            found=f"{trace} ({error.strerror or error})",
+            fix="choose another folder",
+        ) from error

@@ -1,0 +1,170 @@
+"""The rectified picture (Eq. 5): the piece of ground that is shown, and the frame warped onto it.
+
+For people's eyes only: nothing is ever measured in it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from standoff.core import homography
+from standoff.core.homography import BoolArray, FloatArray
+from standoff.core.types import GroundMap, ImageArray
+from standoff.stages.sinks.ground_shapes import clip_in_front, lens_reach_px
+
+_GRID = 24
+_LENS_STEP_PX = 16
+_COARSEST_RATIO = 4.0  # ground metres per pixel over the finest seen: beyond, the rectified picture is a smear
+_RARE_PERCENT = 10.0  # of the picture on either side that the window may leave out
+_OUTSIDE_PX = -1e4
+
+
+@dataclass(frozen=True, slots=True)
+class GroundWindow:
+    """A piece of ground as a picture: a similarity, so that a metre is as long everywhere.
+
+    Attributes:
+        ground_to_window: (3, 3) from metres to window pixels, y down.
+        size_px: (width, height).
+        m_per_px: Metres in one pixel.
+    """
+
+    ground_to_window: FloatArray
+    size_px: tuple[int, int]
+    m_per_px: float
+
+    def to_window(self, points_m: FloatArray) -> FloatArray:
+        """Map (N, 2) metres to window pixels; NaN stays NaN."""
+        points_px: FloatArray = points_m @ self.ground_to_window[:2, :2].T + self.ground_to_window[:2, 2]
+        return points_px
+
+    def covers(self, points_m: FloatArray) -> BoolArray:
+        """Return (N,) whether each point lies in the window."""
+        points_px = self.to_window(points_m)
+        inside: BoolArray = ((points_px >= 0) & (points_px <= self.size_px)).all(axis=1)
+        return inside
+
+
+def window_around(
+    points_m: FloatArray, size_px: tuple[int, int], up: FloatArray, *, margin_m: float = 2.0
+) -> GroundWindow:
+    """Fit a window of a given size around points.
+
+    Args:
+        points_m: (N, 2) ground points to be seen, N > 0, finite.
+        size_px: (width, height) of the window.
+        up: (2,) ground direction that points up in it.
+        margin_m: Ground shown beyond the outermost points.
+
+    >>> window_around(np.array([[0.0, 0.0], [6.0, 6.0]]), (100, 100), np.array([0.0, 1.0])).m_per_px
+    0.1
+    """
+    up = up / np.linalg.norm(up)
+    turn = np.array([[up[1], -up[0]], [-up[0], -up[1]]])
+    turned = points_m @ turn.T
+    low, high = turned.min(axis=0) - margin_m, turned.max(axis=0) + margin_m
+    m_per_px = float(((high - low) / size_px).max())
+    ground_to_window = np.eye(3)
+    ground_to_window[:2, :2] = turn / m_per_px
+    ground_to_window[:2, 2] = np.array(size_px) / 2.0 - (low + high) / 2.0 / m_per_px
+    return GroundWindow(ground_to_window, size_px, m_per_px)
+
+
+def seen_ground_m(ground: GroundMap) -> FloatArray:
+    """Return (N, 2) ground points that spread over what the camera sees well enough to be worth showing."""
+    width, height = ground.image_size_px
+    x, y = np.meshgrid(np.linspace(0, width - 1, _GRID), np.linspace(0, height - 1, _GRID))
+    pixels = ground.undistorted(np.column_stack([x.ravel(), y.ravel()]))
+    if len(ground.valid_px):
+        outline = ground.valid_px.astype(np.float32).reshape(-1, 1, 2)
+        inside = [
+            bool(np.isfinite(p).all()) and cv2.pointPolygonTest(outline, p.tolist(), False) >= 0 for p in pixels
+        ]
+        pixels = pixels[inside]
+    points_m, valid = homography.apply(ground.image_to_ground, pixels)
+    coarseness = np.linalg.norm(homography.point_jacobian(ground.image_to_ground, pixels), axis=(1, 2))
+    valid &= coarseness <= _COARSEST_RATIO * np.nanmin(np.where(valid, coarseness, np.nan), initial=np.inf)
+    points_m = points_m[valid]
+    if not len(points_m):
+        return points_m
+    low, high = np.percentile(points_m, [_RARE_PERCENT, 100 - _RARE_PERCENT], axis=0)
+    common: FloatArray = points_m[((points_m >= low) & (points_m <= high)).all(axis=1)]
+    return common
+
+
+def camera_up(ground: GroundMap) -> FloatArray:
+    """Return (2,) the ground direction that leads up in the middle of the lower half of the picture."""
+    width, height = ground.image_size_px
+    column = np.array([[width / 2.0, 0.75 * height], [width / 2.0, 0.75 * height - 1.0]])
+    (start, end), valid = ground.to_ground(column)
+    direction: FloatArray = end - start
+    return direction if valid.all() and np.linalg.norm(direction) > 0 else np.array([0.0, 1.0])
+
+
+def rectify(picture: ImageArray, ground: GroundMap, window: GroundWindow, onto: ImageArray) -> None:
+    """Warp a frame onto the ground plane.
+
+    Args:
+        picture: (H, W, 3) uint8, the frame at any size.
+        ground: Its map.
+        window: What to show.
+        onto: (h, w, 3) uint8 of the window's size, written to where the camera sees the ground.
+
+    Source:
+        Paper, section 5.1, Eq. 5.
+    """
+    window_to_image = homography.invert(ground.image_to_ground) @ homography.invert(window.ground_to_window)
+    factor = np.array(picture.shape[1::-1]) / ground.image_size_px
+    to_picture = np.diag([*factor, 1.0])
+    to_picture[:2, 2] = (factor - 1.0) / 2.0
+    behind = _behind_camera(window_to_image, window)
+    background = onto.copy() if behind.any() else onto
+    if ground.camera is None:
+        flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+        cv2.warpPerspective(
+            picture, to_picture @ window_to_image, window.size_px, dst=onto, flags=flags, borderMode=cv2.BORDER_TRANSPARENT
+        )
+    else:
+        _remap_through_lens(picture, ground, window_to_image, to_picture, onto)
+    if behind.any():
+        onto[behind] = background[behind]
+
+
+def _behind_camera(window_to_image: FloatArray, window: GroundWindow) -> BoolArray:
+    """Return (h, w) what lies behind the camera's own plane; (0, 0) when the whole window is in front."""
+    width, height = window.size_px
+    corners = np.array([[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]])
+    nearest = 1e-6 * float(np.abs(corners @ window_to_image[2, :2] + window_to_image[2, 2]).max())
+    front = clip_in_front(window_to_image, corners, nearest)
+    if front is corners:
+        return np.zeros((0, 0), dtype=bool)
+    mask = np.ones((height, width), dtype=np.uint8)
+    if len(front):
+        cv2.fillPoly(mask, [np.round(front).astype(np.int32)], 0)
+    return mask.astype(bool)
+
+
+def _remap_through_lens(
+    picture: ImageArray, ground: GroundMap, window_to_image: FloatArray, to_picture: FloatArray, onto: ImageArray
+) -> None:
+    """Distort a coarse grid of points only; between them the lens is as good as linear for the eye."""
+    camera = ground.camera
+    assert camera is not None
+    height, width = onto.shape[:2]
+    columns, rows = -(-width // _LENS_STEP_PX) + 1, -(-height // _LENS_STEP_PX) + 1
+    x, y = np.meshgrid(np.arange(columns) * _LENS_STEP_PX, np.arange(rows) * _LENS_STEP_PX)
+    points, valid = homography.apply(window_to_image, np.column_stack([x.ravel(), y.ravel()]))
+    with np.errstate(invalid="ignore"):
+        valid &= np.linalg.norm(points - camera.matrix[:2, 2], axis=1) <= 1.05 * lens_reach_px(camera)
+    points[~valid] = 0.0
+    at, _ = homography.apply(to_picture, camera.distort(points))
+    grid = np.column_stack([at, valid]).reshape(rows, columns, 3).astype(np.float32)
+    # warpAffine with the step as scale keeps grid points on their pixels; cv2.resize would shift them by half a step.
+    scale = np.array([[_LENS_STEP_PX, 0.0, 0.0], [0.0, _LENS_STEP_PX, 0.0]])
+    dense = cv2.warpAffine(grid, scale, (width, height), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    dense[dense[:, :, 2] < 1.0] = _OUTSIDE_PX
+    x_px, y_px = np.ascontiguousarray(dense[:, :, 0]), np.ascontiguousarray(dense[:, :, 1])
+    cv2.remap(picture, x_px, y_px, cv2.INTER_LINEAR, dst=onto, borderMode=cv2.BORDER_TRANSPARENT)

@@ -1,0 +1,63 @@
+"""JSON that every reader accepts: no NaN, no infinity, no types of ours."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Mapping, Set
+from dataclasses import asdict, is_dataclass
+from datetime import date
+from enum import Enum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from standoff.stages.sinks.folder import partial_path
+
+
+def plain(value: Any) -> Any:  # noqa: ANN401
+    """Return the value in JSON's own types; numbers that are not finite become None.
+
+    >>> plain({"distance_m": float("nan"), "size_px": np.array([4, 3]), "path": Path("a.mp4")})
+    {'distance_m': None, 'size_px': [4, 3], 'path': 'a.mp4'}
+    """
+    if isinstance(value, np.generic | np.ndarray):
+        value = value.tolist()
+    if is_dataclass(value) and not isinstance(value, type):
+        value = asdict(value)
+    if isinstance(value, Enum):
+        value = value.value
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple | Set):
+        return [plain(item) for item in value]
+    return _plain_scalar(value)
+
+
+def _plain_scalar(value: Any) -> Any:  # noqa: ANN401
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if value is None or isinstance(value, bool | int | str):
+        return value
+    return value.isoformat() if isinstance(value, date) else str(value)
+
+
+def json_line(value: Any) -> str:  # noqa: ANN401
+    r"""Return the value as one line of JSON with its line end.
+
+    >>> json_line({"gap_m": float("inf")})
+    '{"gap_m": null}\n'
+    """
+    return json.dumps(plain(value), allow_nan=False, ensure_ascii=False) + "\n"
+
+
+def write_json(path: Path, value: Any) -> None:  # noqa: ANN401
+    """Write an indented JSON file that is, at any moment, either the old one or the new one."""
+    partial = partial_path(path)
+    with partial.open("w", encoding="utf-8") as file:
+        file.write(json.dumps(plain(value), allow_nan=False, ensure_ascii=False, indent=2) + "\n")
+        file.flush()
+        os.fsync(file.fileno())
+    partial.replace(path)

@@ -1,0 +1,164 @@
+"""Lines, dashes, fills and labels on a picture, all sized in proportion to it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+
+from standoff.core.homography import FloatArray
+from standoff.core.types import ImageArray
+from standoff.stages.sinks.palette import Bgr, bgr
+from standoff.stages.sinks.text import TextSprites, blend
+
+_SHIFT = 4
+_FAR_PX = 1e6
+_MOST_DASHES = 600
+
+Rectangle = tuple[int, int, int, int]
+
+
+class Painter:
+    """Draw on one picture.
+
+    Labels are placed where no earlier label is, so draw the important ones first.
+
+    Args:
+        canvas: (H, W, 3) uint8 BGR, drawn on in place.
+        text: Where text comes from.
+        reference_px: Height that sizes are in proportion to; the canvas's own by default.
+    """
+
+    def __init__(self, canvas: ImageArray, text: TextSprites, reference_px: int | None = None) -> None:
+        self._canvas, self._text = canvas, text
+        height = reference_px or canvas.shape[0]
+        self.stroke_px = max(1, round(height / 380))
+        self.font_px = max(11, round(height / 56))
+        self._taken: list[Rectangle] = []
+
+    def line(
+        self, points_px: FloatArray, colour: Bgr, *, width_px: int | None = None, dashed: bool = False
+    ) -> None:
+        """Draw an open polyline through (N, 2) points."""
+        self._strokes(self._dashes(points_px) if dashed else [points_px], colour, width_px or self.stroke_px)
+
+    def cased_line(self, points_px: FloatArray, colour: Bgr, *, dashed: bool = False) -> None:
+        """Draw a polyline with a dark edge, to be seen on any ground."""
+        strokes = self._dashes(points_px) if dashed else [points_px]
+        self._strokes(strokes, bgr("dark"), self.stroke_px + 2)
+        self._strokes(strokes, colour, self.stroke_px)
+
+    def _strokes(self, strokes: Sequence[FloatArray], colour: Bgr, width_px: int) -> None:
+        fixed = [_fixed_point(stroke) for stroke in strokes if len(stroke) > 1 and np.isfinite(stroke).all()]
+        cv2.polylines(self._canvas, fixed, False, colour, width_px, cv2.LINE_AA, _SHIFT)
+
+    def _dashes(self, points_px: FloatArray) -> list[FloatArray]:
+        lengths = np.linalg.norm(np.diff(points_px, axis=0), axis=1)
+        along = np.concatenate([[0.0], np.cumsum(lengths)])
+        count = along[-1] / (8.0 * self.stroke_px) if len(along) > 1 else 0.0
+        if not 1.0 <= count <= _MOST_DASHES:
+            return [points_px]
+        starts = np.arange(0.0, along[-1], along[-1] / np.ceil(count))
+        ends = np.minimum(starts + 0.55 * along[-1] / np.ceil(count), along[-1])
+        at = np.column_stack([starts, ends]).ravel()
+        on = np.column_stack([np.interp(at, along, points_px[:, k]) for k in (0, 1)])
+        return list(on.reshape(-1, 2, 2))
+
+    def box(self, xyxy_px: FloatArray, colour: Bgr, *, dashed: bool = False) -> None:
+        """Draw a rectangle."""
+        x1, y1, x2, y2 = np.clip(xyxy_px, -_FAR_PX, _FAR_PX)
+        if dashed:
+            self.line(np.array([[x1, y1], [x2, y1], [x2, y2], [x1, y2], [x1, y1]]), colour, dashed=True)
+            return
+        corners = (round(x1), round(y1)), (round(x2), round(y2))
+        cv2.rectangle(self._canvas, *corners, bgr("dark"), self.stroke_px + 2)
+        cv2.rectangle(self._canvas, *corners, colour, self.stroke_px)
+
+    def dot(self, point_px: FloatArray, colour: Bgr, *, hollow: bool = False) -> None:
+        """Draw a small disc with a dark edge."""
+        if not np.isfinite(point_px).all():
+            return
+        centre = tuple(_fixed_point(point_px).ravel().tolist())
+        radius = (2 + self.stroke_px) << _SHIFT
+        cv2.circle(self._canvas, centre, radius + (1 << _SHIFT), bgr("dark"), -1, cv2.LINE_AA, _SHIFT)
+        thickness = self.stroke_px if hollow else -1
+        cv2.circle(self._canvas, centre, radius, colour, thickness, cv2.LINE_AA, _SHIFT)
+
+    def fill(self, outline_px: FloatArray, colour: Bgr, opacity: float) -> None:
+        """Tint the inside of an outline."""
+        if len(outline_px) < 3:
+            return
+        height, width = self._canvas.shape[:2]
+        low = np.clip(np.floor(outline_px.min(axis=0)), 0, [width, height]).astype(int)
+        high = np.clip(np.ceil(outline_px.max(axis=0)) + 1, 0, [width, height]).astype(int)
+        area = self._canvas[low[1] : high[1], low[0] : high[0]]
+        if area.size == 0:
+            return
+        tinted = area.copy()
+        cv2.fillPoly(tinted, [_fixed_point(outline_px - low)], colour, cv2.LINE_8, _SHIFT)
+        cv2.addWeighted(tinted, opacity, area, 1.0 - opacity, 0.0, dst=area)
+
+    def label_size_px(self, text: str, *, bold: bool = False) -> tuple[int, int]:
+        """Return the (width, height) of a label."""
+        height, width = self._text.mask(text, self.font_px, bold=bold).shape
+        return width + 2 * self._pad_x, height + 2
+
+    @property
+    def _pad_x(self) -> int:
+        return max(5, self.font_px // 2)
+
+    def label(
+        self,
+        text: str,
+        corners_px: Sequence[tuple[float, float]],
+        *,
+        accent: Bgr | None = None,
+        bold: bool = False,
+        optional: bool = False,
+    ) -> None:
+        """Put text on a dark translucent ground at the first place where it covers no earlier label.
+
+        Args:
+            text: One line.
+            corners_px: Top left corners to try, best first; each is moved into the canvas.
+            accent: Colour of a bar at the left edge.
+            bold: Heavier type.
+            optional: Leave the label out when there is no free place, instead of covering another.
+        """
+        size = self.label_size_px(text, bold=bold)
+        places = [self._inside(corner, size) for corner in corners_px]
+        free = [place for place in places if not self._is_taken(place)]
+        if not free and optional:
+            return
+        x0, y0, x1, y1 = (free or places)[0]
+        self._taken.append((x0, y0, x1, y1))
+        area = self._canvas[y0:y1, x0:x1]
+        cv2.convertScaleAbs(area, dst=area, alpha=0.28, beta=14)
+        if accent is not None:
+            self._canvas[y0:y1, x0 : x0 + max(3, self.font_px // 4)] = accent
+        mask = self._text.mask(text, self.font_px, bold=bold)
+        blend(self._canvas, mask, x0 + self._pad_x, y0 + 1, bgr("light"))
+
+    def title(self, text: str, corner_px: tuple[int, int], colour: Bgr = bgr("light")) -> None:
+        """Write bold text, straight onto the picture."""
+        blend(self._canvas, self._text.mask(text, self.font_px, bold=True), *corner_px, colour)
+
+    def reserve(self, rectangle: Rectangle) -> None:
+        """Keep labels away from left, top, right, bottom."""
+        self._taken.append(rectangle)
+
+    def _inside(self, corner_px: tuple[float, float], size_px: tuple[int, int]) -> Rectangle:
+        height, width = self._canvas.shape[:2]
+        x0 = int(min(max(corner_px[0], 0), max(width - size_px[0], 0)))
+        y0 = int(min(max(corner_px[1], 0), max(height - size_px[1], 0)))
+        return x0, y0, min(x0 + size_px[0], width), min(y0 + size_px[1], height)
+
+    def _is_taken(self, place: Rectangle) -> bool:
+        x0, y0, x1, y1 = place
+        return any(x0 < right and left < x1 and y0 < bottom and top < y1 for left, top, right, bottom in self._taken)
+
+
+def _fixed_point(points_px: FloatArray) -> FloatArray:
+    fixed: FloatArray = np.round(np.clip(points_px, -_FAR_PX, _FAR_PX) * (1 << _SHIFT)).astype(np.int32)
+    return fixed

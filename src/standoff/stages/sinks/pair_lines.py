@@ -1,0 +1,105 @@
+"""Which pairs are worth a line in a picture with thirty tracks, and what the line says."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from standoff.core.classes import CLASSES, Role
+from standoff.core.homography import BoolArray, FloatArray
+from standoff.core.types import IntArray
+from standoff.stages.sinks.palette import Tone
+from standoff.stages.sinks.scene import Scene
+
+_UNMEASURED_WITHIN_SHARE = 0.35  # of the picture's width: beyond, an unknown distance is no news
+_RANK: dict[Tone, int] = {"danger": 0, "warning": 1, "unknown": 2, "light": 3}
+
+
+@dataclass(frozen=True, slots=True)
+class PairLine:
+    """A line to draw.
+
+    Attributes:
+        row_a: Row of one end among the tracks.
+        row_b: Row of the other.
+        tone: Severity of the pair's hazard, "unknown" when unmeasured, "light" otherwise.
+        text: The distance with its standard error, or "unknown".
+        dashed: True where the distance is not of this frame: unmeasured, or an end coasts.
+    """
+
+    row_a: int
+    row_b: int
+    tone: Tone
+    text: str
+    dashed: bool
+
+
+def distance_text(distance_m: float, sigma_m: float, *, filtered: bool = False) -> str:
+    """Return a distance for people; what the outlier filter made up is marked.
+
+    >>> distance_text(7.42, 0.31), distance_text(7.42, 0.031), distance_text(float("nan"), 1.0)
+    ('7.4 ±0.3 m', '7.42 ±0.03 m', 'unknown')
+    >>> distance_text(7.42, 0.31, filtered=True), distance_text(7.42, float("nan"))
+    ('≈ 7.4 ±0.3 m', '7.4 m')
+    """
+    if not np.isfinite(distance_m):
+        return "unknown"
+    decimals = 2 if sigma_m < 0.095 else 1
+    error = f" ±{sigma_m:.{decimals}f}" if np.isfinite(sigma_m) else ""
+    return f"{'≈ ' if filtered else ''}{distance_m:.{decimals}f}{error} m"
+
+
+def pair_lines(scene: Scene, feet_px: FloatArray, within_m: float) -> list[PairLine]:
+    """Choose the pairs to draw, gravest first.
+
+    Every pair with an open hazard; for each person (each entity, in pairs without one) the nearest measured
+    pair within `within_m`, and the nearest in the picture that cannot be measured.
+
+    Args:
+        scene: What there is.
+        feet_px: (M, 2) where each track stands in the picture.
+        within_m: Largest distance of a pair without a hazard.
+    """
+    pairs, tracks = scene.proximities, scene.tracks
+    if not len(pairs):
+        return []
+    row_of = {track_id: row for row, track_id in enumerate(tracks.track_id.tolist())}
+    rows = np.array([[row_of[a], row_of[b]] for a, b in zip(pairs.track_a, pairs.track_b, strict=True)])
+    measured = np.isfinite(pairs.distance_m)
+    apart_px = np.linalg.norm(feet_px[rows[:, 0]] - feet_px[rows[:, 1]], axis=1)
+    wanted = _nearest_of_each_owner(rows, tracks.class_id, pairs.distance_m, measured & (pairs.distance_m <= within_m))
+    in_sight = apart_px <= _UNMEASURED_WITHIN_SHARE * scene.size_px[0]
+    wanted |= _nearest_of_each_owner(rows, tracks.class_id, apart_px, ~measured & in_sight)
+    keys = list(zip(pairs.track_a.tolist(), pairs.track_b.tolist(), strict=True))
+    wanted |= np.array([key in scene.hazards for key in keys])
+    lines = [_line(scene, k, keys[k], rows[k]) for k in np.flatnonzero(wanted)]
+    return sorted(lines, key=lambda line: _RANK[line.tone])
+
+
+def _nearest_of_each_owner(rows: IntArray, class_id: IntArray, apart: FloatArray, eligible: BoolArray) -> BoolArray:
+    is_person = np.array([CLASSES[c].role is Role.PERSON for c in class_id.tolist()])
+    owns = is_person[rows]
+    owns[~owns.any(axis=1)] = True
+    nearest = np.zeros(len(rows), dtype=bool)
+    order = [k for k in np.argsort(apart, kind="stable") if eligible[k]]
+    seen: set[int] = set()
+    for k in order:
+        owners = set(rows[k][owns[k]].tolist()) - seen
+        nearest[k] = bool(owners)
+        seen |= owners
+    return nearest
+
+
+def _line(scene: Scene, k: int, key: tuple[int, int], rows: IntArray) -> PairLine:
+    pairs = scene.proximities
+    hazard = scene.hazards.get(key)
+    measured = bool(np.isfinite(pairs.distance_m[k]))
+    tone: Tone = hazard.severity if hazard else ("light" if measured else "unknown")
+    return PairLine(
+        row_a=int(rows[0]),
+        row_b=int(rows[1]),
+        tone=tone,
+        text=distance_text(pairs.distance_m[k], pairs.sigma_m[k], filtered=bool(pairs.filtered[k])),
+        dashed=not (measured and scene.tracks.observed[rows].all()),
+    )

@@ -1,0 +1,45 @@
+"""The colours of every output, in one place, so that red means the same in the video and in the report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Literal
+
+from standoff.core.classes import CLASSES, Role
+
+Bgr = tuple[int, int, int]
+Tone = Literal["danger", "warning", "unknown", "worker", "machine", "reference", "light", "dark"]
+
+HEX: Mapping[Tone, str] = MappingProxyType(
+    {
+        "danger": "#f5484a",
+        "warning": "#ffb224",
+        "unknown": "#a3abb5",
+        "worker": "#1fc7b6",
+        "machine": "#6ea8ff",
+        "reference": "#c9a2ff",
+        "light": "#f4f6f8",
+        "dark": "#14181d",
+    }
+)
+
+
+def bgr(tone: Tone) -> Bgr:
+    """Return a colour for OpenCV.
+
+    >>> bgr("danger")
+    (74, 72, 245)
+    """
+    red, green, blue = bytes.fromhex(HEX[tone][1:])
+    return blue, green, red
+
+
+def class_tone(class_id: int) -> Tone:
+    """Return the colour of an entity that is in no hazard.
+
+    >>> class_tone(1)
+    'machine'
+    """
+    tones: dict[Role, Tone] = {Role.PERSON: "worker", Role.EQUIPMENT: "machine", Role.REFERENCE: "reference"}
+    return tones[CLASSES[class_id].role]

@@ -1,0 +1,92 @@
+"""A Parquet file that survives a killed process: small whole parts, merged at the end."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import shutil
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from standoff.stages.sinks.folder import partial_path, parts_folder
+
+Column = npt.NDArray[Any] | Sequence[Any]
+Columns = Mapping[str, Column]
+
+_ROW_GROUP_ROWS = 65_536
+
+
+class ParquetParts:
+    """Collect rows; write a part now and then; make one file of all parts at the end.
+
+    `tracks.parquet` appears when it is whole. Until then `tracks.parts/` holds readable Parquet files
+    (`pyarrow.parquet.read_table("tracks.parts")` reads them all), so a kill costs the last seconds only.
+
+    Args:
+        path: Final name.
+        schema: Columns, with the file's metadata.
+        flush_s: Seconds of wall time after which the collected rows become a part.
+        flush_rows: Number of rows after which they do.
+    """
+
+    def __init__(self, path: Path, schema: pa.Schema, *, flush_s: float, flush_rows: int) -> None:
+        self._path, self._schema = path, schema
+        self._flush_s, self._flush_rows = flush_s, flush_rows
+        self._chunks: list[Columns] = []
+        self._rows = 0
+        self._flushed_at = time.monotonic()
+        self._parts: list[Path] = []
+        self._folder = parts_folder(path)
+        self._folder.mkdir(exist_ok=True)
+
+    def append(self, columns: Columns) -> None:
+        """Add rows: one array or list for each column of the schema, all of one length; NaN becomes null."""
+        rows = len(columns[self._schema.names[0]])
+        if rows:
+            self._chunks.append(columns)
+            self._rows += rows
+        if self._rows >= self._flush_rows or time.monotonic() - self._flushed_at >= self._flush_s:
+            self._flush()
+
+    def _flush(self) -> None:
+        self._flushed_at = time.monotonic()
+        if not self._rows:
+            return
+        columns = [_joined([chunk[field.name] for chunk in self._chunks], field.type) for field in self._schema]
+        part = self._folder / f"part-{len(self._parts):06d}.parquet"
+        partial = partial_path(part)
+        pq.write_table(pa.Table.from_arrays(columns, schema=self._schema), partial)
+        partial.replace(part)
+        self._parts.append(part)
+        self._chunks, self._rows = [], 0
+
+    def close(self) -> None:
+        """Merge all parts under the final name and remove them."""
+        self._flush()
+        partial = partial_path(self._path)
+        with pq.ParquetWriter(partial, self._schema) as writer:
+            gathered: list[pa.Table] = []
+            for part in self._parts:
+                gathered.append(pq.read_table(part, schema=self._schema))
+                if sum(table.num_rows for table in gathered) >= _ROW_GROUP_ROWS:
+                    writer.write_table(pa.concat_tables(gathered))
+                    gathered = []
+            if gathered:
+                writer.write_table(pa.concat_tables(gathered))
+        with partial.open("rb") as file:
+            os.fsync(file.fileno())
+        partial.replace(self._path)
+        shutil.rmtree(self._folder)
+
+
+def _joined(chunks: list[Column], arrow_type: pa.DataType) -> pa.Array:
+    arrays = [chunk for chunk in chunks if isinstance(chunk, np.ndarray)]
+    values = np.concatenate(arrays) if arrays else list(itertools.chain.from_iterable(chunks))
+    return pa.array(values, arrow_type, from_pandas=True)

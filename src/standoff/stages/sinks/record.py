@@ -1,0 +1,122 @@
+"""`run.json`: what was run, with what, how it ended and how long each stage took."""
+
+from __future__ import annotations
+
+import platform
+import time
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Mapping
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from standoff import __version__
+from standoff.core.types import FrameResult, GroundMap, Hazard, NoGroundMap, Outcome, Severity
+from standoff.stages.sinks.durations import Durations
+from standoff.stages.sinks.json_text import write_json
+from standoff.stages.sinks.scene import worse
+
+_LIBRARIES = ("numpy", "scipy", "numba", "opencv-python-headless", "onnxruntime", "av", "pyarrow")
+
+
+class RecordSink:
+    """Write the record at the start, with status "running", and again at the end.
+
+    A record that still says "running" after its process has gone belongs to a killed run.
+
+    Args:
+        path: The file, usually `run.json`.
+        descriptions: What only the caller knows (resolved configuration, source, model, ground), kept as
+            given; what JSON has no word for becomes text, and a number that is not finite null.
+    """
+
+    def __init__(self, path: Path | str, descriptions: Mapping[str, Any]) -> None:
+        self._path = Path(path)
+        self._head = {"started_at": datetime.now(UTC), "versions": library_versions(), **descriptions}
+        self._started = time.monotonic()
+        self._counts: Counter[str] = Counter()
+        self._no_map: Counter[str] = Counter()
+        self._map_methods: Counter[str] = Counter()
+        self._invalid: Counter[str] = Counter()
+        self._hazard_severity: dict[str, Severity] = {}
+        self._live_tracks: set[int] = set()
+        self._live_pairs: set[tuple[int, int]] = set()
+        self._stages: defaultdict[str, Durations] = defaultdict(Durations)
+        write_json(self._path, {"status": "running", "message": "", **self._head})
+
+    def write(self, result: FrameResult) -> None:
+        """Count this frame."""
+        self._count_rows(result)
+        self._count_new_ids(result)
+        if isinstance(result.ground, NoGroundMap):
+            self._no_map[result.ground.reason] += 1
+        else:
+            self._map_methods[result.ground.method] += 1
+        self._invalid.update(result.positions.reason[~result.positions.valid].tolist())
+        self._count_hazards(result.hazards)
+        for stage, duration_ms in result.stage_ms.items():
+            self._stages[stage].add(duration_ms)
+
+    def _count_hazards(self, events: Iterable[Hazard]) -> None:
+        for event in events:
+            so_far = self._hazard_severity.get(event.hazard_id, "unknown")
+            self._hazard_severity[event.hazard_id] = worse(event.severity, so_far)
+
+    def _count_rows(self, result: FrameResult) -> None:
+        positions, pairs = result.positions, result.proximities
+        self._counts.update(
+            frames=1,
+            detected_frames=int(result.detected),
+            frames_with_map=int(isinstance(result.ground, GroundMap)),
+            detections=len(result.detections),
+            positions=len(positions),
+            valid_positions=int(positions.valid.sum()),
+            distances=len(pairs),
+            measured_distances=int(np.isfinite(pairs.distance_m).sum()),
+            filtered_distances=int(pairs.filtered.sum()),
+        )
+
+    def _count_new_ids(self, result: FrameResult) -> None:
+        """Count ids that the last frame did not have: a track is listed from its birth to its end."""
+        pairs = result.proximities
+        tracks = set(result.tracks.track_id.tolist())
+        live_pairs = set(zip(pairs.track_a.tolist(), pairs.track_b.tolist(), strict=True))
+        self._counts.update(tracks=len(tracks - self._live_tracks), pairs=len(live_pairs - self._live_pairs))
+        self._live_tracks, self._live_pairs = tracks, live_pairs
+
+    def close(self, outcome: Outcome) -> None:
+        """Write the final record."""
+        self._count_hazards(outcome.hazards)
+        wall_s = time.monotonic() - self._started
+        record = {
+            "status": outcome.status,
+            "message": outcome.message,
+            **self._head,
+            "finished_at": datetime.now(UTC),
+            "wall_s": round(wall_s, 3),
+            "frames_per_s": round(self._counts["frames"] / wall_s, 2) if wall_s > 0 else None,
+            "counts": {
+                **self._counts,
+                "hazards": Counter(self._hazard_severity.values()),
+                "map_methods": self._map_methods,
+                "no_ground_map": self._no_map,
+                "invalid_positions": self._invalid,
+            },
+            "stages": {stage: durations.summary() for stage, durations in self._stages.items()},
+            "sink_errors": outcome.sink_errors,
+        }
+        write_json(self._path, record)
+
+
+def library_versions() -> dict[str, str]:
+    """Return the versions of standoff, Python, the libraries that results depend on, and the platform."""
+    found = {"standoff": __version__, "python": platform.python_version(), "platform": platform.platform()}
+    for name in _LIBRARIES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not installed"
+    return found

@@ -1,0 +1,131 @@
+"""What there is to draw in one frame: the measurements without the pixels, and which hazards are open."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from standoff.core.classes import CLASSES
+from standoff.core.homography import FloatArray
+from standoff.core.types import (
+    FrameResult,
+    GroundMap,
+    GroundPositions,
+    Hazard,
+    NoGroundMap,
+    Proximities,
+    Severity,
+    Tracks,
+)
+from standoff.stages.sinks.palette import Tone, class_tone
+
+Pair = tuple[int, int]
+
+
+class OpenHazards:
+    """The hazards that are open now, gathered from their events."""
+
+    def __init__(self) -> None:
+        self._open: dict[str, Hazard] = {}
+
+    def update(self, events: Iterable[Hazard]) -> None:
+        """Take a frame's events."""
+        for event in events:
+            if event.phase == "closed":
+                self._open.pop(event.hazard_id, None)
+            else:
+                self._open[event.hazard_id] = event
+
+    def by_pair(self) -> dict[Pair, Hazard]:
+        """Return the open hazard of each pair of tracks."""
+        return {(e.track_ids[0], e.track_ids[1]): e for e in self._open.values() if len(e.track_ids) == 2}
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """One frame's measurements.
+
+    Attributes:
+        frame_index: Position in the source.
+        time_s: Presentation timestamp.
+        size_px: (width, height) of the full-size picture that all pixels belong to.
+        ground: The map, or why there is none.
+        tracks: Live tracks.
+        positions: Row i belongs to track i.
+        proximities: All configured pairs.
+        hazards: Open hazards by pair.
+    """
+
+    frame_index: int
+    time_s: float
+    size_px: tuple[int, int]
+    ground: GroundMap | NoGroundMap
+    tracks: Tracks
+    positions: GroundPositions
+    proximities: Proximities
+    hazards: Mapping[Pair, Hazard]
+
+    @classmethod
+    def of(cls, result: FrameResult, open_hazards: OpenHazards) -> Scene:
+        """Keep what is drawn of a result; the frame's pixels are let go."""
+        return cls(
+            frame_index=result.frame.index,
+            time_s=result.frame.time_s,
+            size_px=result.frame.size_px,
+            ground=result.ground,
+            tracks=result.tracks,
+            positions=result.positions,
+            proximities=result.proximities,
+            hazards=open_hazards.by_pair(),
+        )
+
+    def track_tones(self) -> list[Tone]:
+        """Return the colour of each track: of its gravest hazard, else of its class."""
+        gravest: dict[int, Severity] = {}
+        for pair, hazard in self.hazards.items():
+            for track_id in pair:
+                gravest[track_id] = worse(hazard.severity, gravest.get(track_id, "unknown"))
+        ids_and_classes = zip(self.tracks.track_id.tolist(), self.tracks.class_id.tolist(), strict=True)
+        return [gravest.get(track_id, class_tone(class_id)) for track_id, class_id in ids_and_classes]
+
+    def names(self) -> dict[int, str]:
+        """Return how each track is called in pictures: its class and id.
+
+        Class names have spaces here: "wheel loader 4".
+        """
+        ids_and_classes = zip(self.tracks.track_id.tolist(), self.tracks.class_id.tolist(), strict=True)
+        return {track_id: track_name(track_id, class_id) for track_id, class_id in ids_and_classes}
+
+    def feet_px(self) -> FloatArray:
+        """Return (M, 2) where each track stands, in full-size picture pixels.
+
+        The measured ground position, seen through the camera; the bottom centre of the box where there is none.
+        """
+        xyxy = self.tracks.xyxy_px
+        feet = np.column_stack([(xyxy[:, 0] + xyxy[:, 2]) / 2.0, xyxy[:, 3]])
+        if isinstance(self.ground, GroundMap) and len(feet):
+            seen, in_front = self.ground.to_image(self.positions.xy_m)
+            measured = in_front & self.positions.valid
+            feet[measured] = seen[measured]
+        return feet
+
+
+def track_name(track_id: int, class_id: int) -> str:
+    """Return what a track is called.
+
+    >>> track_name(4, 2)
+    'wheel loader 4'
+    """
+    return f"{CLASSES[class_id].name.replace('_', ' ')} {track_id}"
+
+
+def worse(severity: Severity, other: Severity) -> Severity:
+    """Return the graver of two severities; "unknown" is what a hazard is called until it is measured.
+
+    >>> worse("warning", "danger")
+    'danger'
+    """
+    order: tuple[Severity, ...] = ("unknown", "warning", "danger")
+    return max(severity, other, key=order.index)

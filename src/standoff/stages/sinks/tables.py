@@ -1,0 +1,197 @@
+"""`tracks.parquet`, `proximity.parquet`, `frames.parquet`: every number of a run, for other people's tools.
+
+A number that was not measured is null, never NaN and never a stand-in. Each column carries its unit and
+description in its Arrow field metadata. `time_to_contact_s` alone can be infinite: not approaching.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+
+from standoff import __version__
+from standoff.core.classes import CLASSES
+from standoff.core.types import FrameResult, GroundMap, IntArray, NoGroundMap, Outcome, TextArray
+from standoff.stages.sinks.params import TableParams
+from standoff.stages.sinks.parquet_parts import Columns, ParquetParts
+
+_CLASS = pa.dictionary(pa.int32(), pa.string())
+_NAMES: TextArray = np.array([site_class.name for site_class in CLASSES], dtype=object)
+
+_FRAME_COLUMNS = (
+    ("stream_id", pa.string(), "", "name of the stream"),
+    ("frame", pa.int64(), "", "index in the source, from 0, skipped frames counted"),
+    ("time_s", pa.float64(), "s", "presentation timestamp from the start of the source"),
+)
+_TRACK_COLUMNS = (
+    *_FRAME_COLUMNS,
+    ("track_id", pa.int64(), "", "unique in the stream, never used again"),
+    ("class", _CLASS, "", "what it is"),
+    ("score", pa.float64(), "", "confidence of the last detection, 0 to 1"),
+    ("x1_px", pa.float64(), "px", "left edge of the box"),
+    ("y1_px", pa.float64(), "px", "top edge"),
+    ("x2_px", pa.float64(), "px", "right edge"),
+    ("y2_px", pa.float64(), "px", "bottom edge"),
+    ("observed", pa.bool_(), "", "false: predicted, no detection supports it in this frame"),
+    ("age_s", pa.float64(), "s", "since the track was first seen"),
+    ("x_m", pa.float64(), "m", "site frame; null where the position is invalid"),
+    ("y_m", pa.float64(), "m", "site frame; null where the position is invalid"),
+    ("vx_mps", pa.float64(), "m/s", "site frame; null while unknown"),
+    ("vy_mps", pa.float64(), "m/s", "site frame; null while unknown"),
+    ("sigma_x_m", pa.float64(), "m", "standard error of x_m"),
+    ("sigma_y_m", pa.float64(), "m", "standard error of y_m"),
+    ("cov_xy_m2", pa.float64(), "m^2", "covariance of x_m and y_m"),
+    ("radius_m", pa.float64(), "m", "action radius"),
+    ("valid", pa.bool_(), "", "whether the position was measured"),
+    ("reason", pa.string(), "", "why not; empty where valid"),
+)
+_PROXIMITY_COLUMNS = (
+    *_FRAME_COLUMNS,
+    ("track_a", pa.int64(), "", "the smaller track id"),
+    ("track_b", pa.int64(), "", "the larger track id"),
+    ("class_a", _CLASS, "", "class of track_a"),
+    ("class_b", _CLASS, "", "class of track_b"),
+    ("distance_m", pa.float64(), "m", "centre to centre on the ground; null where not measured"),
+    ("gap_m", pa.float64(), "m", "distance less both action radii; negative is a breach; null where not measured"),
+    ("sigma_m", pa.float64(), "m", "standard error of the distance; null where not measured"),
+    ("closing_mps", pa.float64(), "m/s", "positive: approaching; null while unknown"),
+    ("time_to_contact_s", pa.float64(), "s", "until the gap is 0; infinity: never at this speed; null while unknown"),
+    ("filtered", pa.bool_(), "", "true: the outlier filter replaced the distance"),
+    ("measured", pa.bool_(), "", "false: the distance is unknown, which is not the same as far away"),
+)
+_FRAMES_COLUMNS = (
+    *_FRAME_COLUMNS,
+    ("detected", pa.bool_(), "", "false: the detector rested in this frame"),
+    ("detections", pa.int64(), "", "number of detections; null where the detector rested"),
+    ("tracks", pa.int64(), "", "number of live tracks"),
+    ("map", pa.bool_(), "", "whether there is a ground map; false: nothing was measured in this frame"),
+    ("map_method", pa.string(), "", "how the map was found; null without a map"),
+    ("map_reason", pa.string(), "", "why there is no map; null with a map"),
+    ("map_age_s", pa.float64(), "s", "since the map was last observed; null without a map"),
+    ("scale_m_per_px", pa.float64(), "m/px", "Eq. 6's scale; null without a map"),
+    ("image_to_ground", pa.list_(pa.float64()), "", "3 x 3, undistorted pixels to metres, row by row; null without"),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """One table's columns and how a frame fills them.
+
+    Attributes:
+        schema: Arrow schema with units and descriptions.
+        rows: A frame's rows, one array or list for each column.
+    """
+
+    schema: pa.Schema
+    rows: Callable[[FrameResult], Columns]
+
+
+class TableSink:
+    """Write one table as Parquet; a killed run leaves its parts readable.
+
+    Args:
+        path: Final file, `tracks.parquet` for instance; while the run goes on, see `tracks.parts/`.
+        table: `TRACKS`, `PROXIMITY` or `FRAMES`.
+        params: How often parts are written.
+    """
+
+    def __init__(self, path: Path | str, table: Table, params: TableParams | None = None) -> None:
+        params = params or TableParams()
+        self._rows = table.rows
+        self._parts = ParquetParts(
+            Path(path), table.schema, flush_s=params.flush_s, flush_rows=params.flush_rows
+        )
+
+    def write(self, result: FrameResult) -> None:
+        """Add this frame's rows."""
+        self._parts.append(self._rows(result))
+
+    def close(self, outcome: Outcome) -> None:
+        """Merge the parts into the final file."""
+        self._parts.close()
+
+
+def _schema(columns: tuple[tuple[str, pa.DataType, str, str], ...]) -> pa.Schema:
+    fields = [pa.field(name, kind, metadata={"unit": unit, "description": text}) for name, kind, unit, text in columns]
+    return pa.schema(fields, metadata={"standoff_version": __version__, "missing_values": "null: not measured"})
+
+
+def _frame_columns(result: FrameResult, rows: int) -> dict[str, TextArray]:
+    frame = result.frame
+    values = {"stream_id": frame.stream_id, "frame": frame.index, "time_s": frame.time_s}
+    return {name: np.full(rows, value, dtype=object) for name, value in values.items()}
+
+
+def _track_rows(result: FrameResult) -> Columns:
+    tracks, positions = result.tracks, result.positions
+    variance = positions.covariance_m2
+    return {
+        **_frame_columns(result, len(tracks)),
+        "track_id": tracks.track_id,
+        "class": _NAMES[tracks.class_id],
+        "score": tracks.score,
+        **{f"{edge}_px": tracks.xyxy_px[:, i] for i, edge in enumerate(("x1", "y1", "x2", "y2"))},
+        "observed": tracks.observed,
+        "age_s": tracks.age_s,
+        "x_m": positions.xy_m[:, 0],
+        "y_m": positions.xy_m[:, 1],
+        "vx_mps": positions.velocity_mps[:, 0],
+        "vy_mps": positions.velocity_mps[:, 1],
+        "sigma_x_m": np.sqrt(variance[:, 0, 0]),
+        "sigma_y_m": np.sqrt(variance[:, 1, 1]),
+        "cov_xy_m2": variance[:, 0, 1],
+        "radius_m": positions.radius_m,
+        "valid": positions.valid,
+        "reason": positions.reason,
+    }
+
+
+def _classes_of(track_id: IntArray, result: FrameResult) -> TextArray:
+    names = dict(zip(result.tracks.track_id.tolist(), _NAMES[result.tracks.class_id], strict=True))
+    return np.array([names.get(i) for i in track_id.tolist()], dtype=object)
+
+
+def _proximity_rows(result: FrameResult) -> Columns:
+    pairs = result.proximities
+    names = ("track_a", "track_b", "distance_m", "gap_m", "sigma_m", "closing_mps", "time_to_contact_s", "filtered")
+    return {
+        **_frame_columns(result, len(pairs)),
+        **{name: getattr(pairs, name) for name in names},
+        "class_a": _classes_of(pairs.track_a, result),
+        "class_b": _classes_of(pairs.track_b, result),
+        "measured": np.isfinite(pairs.distance_m),
+    }
+
+
+def _map_values(ground: GroundMap | NoGroundMap) -> dict[str, Any]:
+    if isinstance(ground, NoGroundMap):
+        absent = ("map_method", "map_age_s", "scale_m_per_px", "image_to_ground")
+        return {"map": False, "map_reason": ground.reason, **dict.fromkeys(absent)}
+    return {
+        "map": True,
+        "map_reason": None,
+        "map_method": ground.method,
+        "map_age_s": ground.age_s,
+        "scale_m_per_px": ground.scale_m_per_px,
+        "image_to_ground": ground.image_to_ground.ravel().tolist(),
+    }
+
+
+def _frame_rows(result: FrameResult) -> Columns:
+    values = {
+        "detected": result.detected,
+        "detections": len(result.detections) if result.detected else None,
+        "tracks": len(result.tracks),
+        **_map_values(result.ground),
+    }
+    return {**_frame_columns(result, 1), **{name: [value] for name, value in values.items()}}
+
+
+TRACKS = Table(_schema(_TRACK_COLUMNS), _track_rows)
+PROXIMITY = Table(_schema(_PROXIMITY_COLUMNS), _proximity_rows)
+FRAMES = Table(_schema(_FRAMES_COLUMNS), _frame_rows)

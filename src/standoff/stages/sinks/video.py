@@ -1,0 +1,105 @@
+"""`annotated.mp4`: the camera's picture with what was measured, and the ground from above beside it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from standoff.core.types import FrameResult, ImageArray, Outcome
+from standoff.stages.sinks.birdseye import BirdsEye
+from standoff.stages.sinks.drawing import Overlay
+from standoff.stages.sinks.encoder import VideoFile
+from standoff.stages.sinks.params import VideoParams
+from standoff.stages.sinks.scene import OpenHazards, Scene
+from standoff.stages.sinks.text import TextSprites
+
+
+class Composer:
+    """Draw a frame and its panel side by side.
+
+    Args:
+        size_px: (width, height) of the camera's full-size pictures.
+        params: Sizes and what is drawn.
+    """
+
+    def __init__(self, size_px: tuple[int, int], params: VideoParams | None = None) -> None:
+        params = params or VideoParams()
+        text = TextSprites()
+        self._picture_size_px, panel_width_px = _layout(size_px, params)
+        width, height = self._picture_size_px
+        self._canvas: ImageArray = np.zeros((height, width + panel_width_px, 3), dtype=np.uint8)
+        self._overlay = Overlay(params.draw, text)
+        self._birdseye = BirdsEye((panel_width_px, height), params.draw, text) if panel_width_px else None
+
+    @property
+    def size_px(self) -> tuple[int, int]:
+        """(width, height) of the composed picture; even numbers."""
+        return self._canvas.shape[1], self._canvas.shape[0]
+
+    def compose(self, picture: ImageArray, scene: Scene) -> ImageArray:
+        """Draw one frame.
+
+        Args:
+            picture: (H, W, 3) uint8 BGR at `picture_size_px`.
+            scene: What was measured.
+
+        Returns:
+            (height, width, 3) uint8 BGR; the same array each time.
+        """
+        width = self._picture_size_px[0]
+        self._canvas[:, :width] = picture
+        if self._birdseye is not None:
+            self._birdseye.draw(self._canvas[:, width:], picture, scene)
+        self._overlay.draw(self._canvas[:, :width], scene)
+        return self._canvas
+
+    @property
+    def picture_size_px(self) -> tuple[int, int]:
+        """(width, height) that `compose` wants the camera's picture in."""
+        return self._picture_size_px
+
+
+class VideoSink:
+    """Write the annotated video; its first frame is at time 0, and frames keep their distance in time.
+
+    Args:
+        path: The file, usually `annotated.mp4`.
+        params: Sizes, quality and what is drawn.
+    """
+
+    def __init__(self, path: Path | str, params: VideoParams | None = None) -> None:
+        self._path, self._params = Path(path), params or VideoParams()
+        self._hazards = OpenHazards()
+        self._composer: Composer | None = None
+        self._file: VideoFile | None = None
+        self._start_s = 0.0
+
+    def write(self, result: FrameResult) -> None:
+        """Draw and encode this frame."""
+        frame = result.frame
+        if self._composer is None or self._file is None:
+            self._composer = Composer(frame.size_px, self._params)
+            self._file = VideoFile(
+                self._path, self._composer.size_px, crf=self._params.crf, preset=self._params.preset
+            )
+            self._start_s = frame.time_s
+        self._hazards.update(result.hazards)
+        size_px = self._composer.picture_size_px
+        picture = frame.image if size_px == frame.size_px else frame.picture.resized_bgr(*size_px)
+        composed = self._composer.compose(picture, Scene.of(result, self._hazards))
+        self._file.write(composed, frame.time_s - self._start_s)
+
+    def close(self, outcome: Outcome) -> None:
+        """Finish the file; a run without a frame leaves none."""
+        if self._file is not None:
+            self._file.close()
+
+
+def _layout(size_px: tuple[int, int], params: VideoParams) -> tuple[tuple[int, int], int]:
+    """Return the picture's size and the panel's width; even numbers, as 4:2:0 video needs them."""
+    aspect = size_px[0] / size_px[1]
+    total_aspect = aspect + (params.panel_aspect if params.panel else 0.0)
+    height = 2 * round(min(size_px[1], params.max_width_px / total_aspect) / 2)
+    panel = 2 * round(height * params.panel_aspect / 2) if params.panel else 0
+    return (2 * round(height * aspect / 2), height), panel

@@ -1,0 +1,85 @@
+"""Settings of the tracker."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from annotated_types import Ge, Gt, Interval
+from typing_extensions import Doc
+
+
+@dataclass(frozen=True, slots=True)
+class TrackParams:
+    """How detections become tracks.
+
+    Lengths are in box sizes, the geometric mean of a box's width and height, so that near and far,
+    worker and machine need no settings of their own.
+    """
+
+    high_score: Annotated[
+        float,
+        Interval(ge=0, le=1),
+        Doc("Detections at least this sure are assigned to tracks first, and confirm new ones."),
+    ] = 0.4
+    low_score: Annotated[
+        float,
+        Interval(ge=0, le=1),
+        Doc("Less sure ones, down to this, carry on tracks just seen that found nothing better; never more than high."),
+    ] = 0.1
+    start_score: Annotated[
+        float,
+        Interval(ge=0, le=1),
+        Doc("A detection must be this sure to start a track; stricter than high, clutter rarely is."),
+    ] = 0.6
+    min_overlap: Annotated[
+        float,
+        Interval(gt=0, le=1),
+        Doc("Smallest overlap (IoU of the widened boxes) of a detection with the track that it continues."),
+    ] = 0.1
+    margin: Annotated[
+        float,
+        Interval(ge=0, le=2),
+        Doc("Boxes are widened on each side by this share before they are compared, so that few frames a second do."),
+    ] = 0.2
+    duplicate_overlap: Annotated[
+        float,
+        Interval(gt=0, le=1),
+        Doc("Of two persons, or two machines of any class, whose boxes overlap this much, only the surer one counts."),
+    ] = 0.8
+    confirm_hits: Annotated[
+        int,
+        Ge(1),
+        Doc("Detections in a row before a track is reported; those of a stream's first frame are reported at once."),
+    ] = 2
+    max_coast_s: Annotated[
+        float,
+        Ge(0),
+        Doc("Seconds that a track is predicted and reported without a detection; should exceed the detector's rests."),
+    ] = 1.0
+    box_noise: Annotated[
+        float,
+        Gt(0),
+        Doc("Standard error of a detected box's centre, width and height, in box sizes."),
+    ] = 0.1
+    acceleration_noise: Annotated[
+        float,
+        Gt(0),
+        Doc("How much the velocity of a box wanders in a second, in box sizes per second."),
+    ] = 0.7
+    size_drift: Annotated[
+        float,
+        Gt(0),
+        Doc("How much width and height wander in a second, in box sizes."),
+    ] = 0.05
+    start_speed: Annotated[
+        float,
+        Gt(0),
+        Doc("Standard deviation of a new track's unknown velocity, in box sizes per second."),
+    ] = 1.5
+
+    max_unsure_s: float = 2.0
+    min_overlap_unsure: float = .4
+    def __post_init__(self) -> None:
+        if self.low_score > self.high_score:
+            raise ValueError(f"low_score ({self.low_score}) must not exceed high_score ({self.high_score})")
+        if self.start_score < self.high_score:
+            raise ValueError(f"start_score ({self.start_score}) must not be below high_score ({self.high_score})")

@@ -1,0 +1,212 @@
+"""Follow entities from frame to frame."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from standoff.core.classes import CLASSES, Role
+from standoff.core.homography import BoolArray, FloatArray
+from standoff.core.types import Detections, IntArray, Tracks
+from standoff.stages.track import motion
+from standoff.stages.track.association import assign, overlaps, widen
+from standoff.stages.track.params import TrackParams
+
+_ROW = np.dtype(
+    [
+        *motion.MOTION_FIELDS,
+        ("track_id", np.int64),
+        ("score", np.float64),
+        ("class_votes", np.float64, (len(CLASSES),)),
+        ("confirmed", np.bool_),
+        ("hits", np.int64),
+        ("started_s", np.float64),
+        ("seen_s", np.float64),
+        ("sure_s", np.float64),
+    ]
+)
+_ROLE = np.array([list(Role).index(site_class.role) for site_class in CLASSES])
+_REFERENCE = list(Role).index(Role.REFERENCE)
+_OTHER_CLASS = 0.7
+
+
+class Tracker:
+    """Turn detections, frame by frame, into tracks of one stream.
+
+    Sure detections are assigned to tracks first, then unsure ones to the tracks that are left and were
+    seen when the detector last looked: a half-hidden person is still a person where one was just seen
+    (ByteTrack), but clutter must not keep a lost track alive. A track is reported
+    once it is confirmed, coasts on its predicted box while nothing supports it, and ends when it was
+    not seen for `max_coast_s` and the detector looks again without finding it. Persons continue as
+    persons, machines as machines; among machines the class may flicker, and the track's class is the
+    one with the largest sum of scores so far. Reference objects are not tracked.
+
+    Times are presentation timestamps in seconds; the steps between them may vary, and may be zero.
+
+    Args:
+        params: Settings; None takes the defaults.
+
+    Source:
+        Zhang et al., ByteTrack: Multi-Object Tracking by Associating Every Detection Box (2022),
+        algorithm 1.
+
+    >>> tracker = Tracker()
+    >>> box = np.array([[10.0, 10.0, 20.0, 40.0]])
+    >>> tracker.update(0.0, Detections(box, np.array([0.9]), np.array([0]))).track_id
+    array([1])
+    >>> tracker.coast(0.1).observed
+    array([False])
+    """
+
+    def __init__(self, params: TrackParams | None = None) -> None:
+        self._params = params or TrackParams()
+        self._next_id = 1
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget all tracks and the time: a new stream, or a cut, follows.
+
+        Ids go on where they were, so that one object never gives two entities the same id.
+        """
+        self._rows = np.zeros(0, _ROW)
+        self._time_s = -math.inf
+        self._looked_s = -math.inf
+
+    def update(self, time_s: float, detections: Detections) -> Tracks:
+        """Take in what the detector saw.
+
+        Args:
+            time_s: Presentation timestamp, not before the previous one.
+            detections: May be empty: the detector looked and saw nothing.
+
+        Returns:
+            The confirmed tracks in the order of their ids, coasting ones included. Boxes are filtered,
+            which on real detections places feet better than the detector's own boxes do.
+
+        Raises:
+            ValueError: The time is not finite or went backwards.
+        """
+        self._advance(time_s)
+        detections = self._relevant(detections)
+        unclaimed = self._associate(detections)
+        self._end_lost()
+        self._start(detections[unclaimed & (detections.score >= self._params.start_score)])
+        self._looked_s = time_s
+        return self._report()
+
+    def coast(self, time_s: float) -> Tracks:
+        """Predict all tracks to a frame on which the detector rested.
+
+        No track ends here, since nobody looked; those not seen for `max_coast_s` are not reported.
+
+        Args:
+            time_s: Presentation timestamp, not before the previous one.
+
+        Returns:
+            The confirmed tracks in the order of their ids, none of them observed.
+
+        Raises:
+            ValueError: The time is not finite or went backwards.
+        """
+        self._advance(time_s)
+        return self._report(rested=True)
+
+    def _advance(self, time_s: float) -> None:
+        if not math.isfinite(time_s) or time_s < self._time_s:
+            raise ValueError(
+                f"expected a time not before {self._time_s} s, found {time_s} s; call reset() when a new stream begins"
+            )
+        if len(self._rows):
+            motion.predict(self._rows, time_s - self._time_s, self._params)
+        self._time_s = time_s
+
+    def _relevant(self, detections: Detections) -> Detections:
+        """Drop reference objects, hopeless scores, and second boxes around the same thing."""
+        role = _ROLE[detections.class_id]
+        detections = detections[(role != _REFERENCE) & (detections.score >= self._params.low_score)]
+        detections = detections[np.argsort(-detections.score, kind="stable")]
+        role = _ROLE[detections.class_id]
+        same = overlaps(detections.xyxy_px, detections.xyxy_px) >= self._params.duplicate_overlap
+        surer_twin = np.triu(same & (role[:, None] == role), k=1).any(axis=0)
+        return detections[~surer_twin] if surer_twin.any() else detections
+
+    def _associate(self, detections: Detections) -> BoolArray:
+        """Continue tracks with detections; return which detections (N,) are left over."""
+        unclaimed = np.ones(len(detections), dtype=np.bool_)
+        if not len(self._rows) or not len(detections):
+            return unclaimed
+        similarity = self._similarity(detections)
+        confirmed = self._rows["confirmed"].copy()
+        waiting = np.ones(len(self._rows), dtype=np.bool_)
+        high = detections.score >= self._params.high_score
+        params = self._params
+        for tracks, candidates, at_least in (
+            (confirmed, high, params.min_overlap),
+            (confirmed, ~high, params.min_overlap_unsure),
+            (~confirmed, high, params.min_overlap),
+            (~confirmed, ~high, params.min_overlap_unsure),
+        ):
+            rows, columns = np.flatnonzero(tracks & waiting), np.flatnonzero(candidates & unclaimed)
+            if not len(rows) or not len(columns):
+                continue
+            first, second = assign(similarity[np.ix_(rows, columns)], at_least)
+            self._continue(rows[first], detections[columns[second]])
+            waiting[rows[first]] = False
+            unclaimed[columns[second]] = False
+        return unclaimed
+
+    def _similarity(self, detections: Detections) -> FloatArray:
+        """Return (M, N) overlap of tracks with detections; less for another class, 0 for another role."""
+        margin = self._params.margin
+        predicted_px = motion.to_edges(self._rows["box"])
+        class_id = self._class_id(self._rows)[:, None]
+        agreement = np.where(class_id == detections.class_id, 1.0, _OTHER_CLASS)
+        agreement *= _ROLE[class_id] == _ROLE[detections.class_id]
+        return agreement * overlaps(widen(predicted_px, margin), widen(detections.xyxy_px, margin))
+
+    def _continue(self, which: IntArray, detections: Detections) -> None:
+        rows = self._rows
+        motion.correct(rows, which, motion.to_centre(detections.xyxy_px), self._params)
+        rows["score"][which] = detections.score
+        rows["class_votes"][which, detections.class_id] += detections.score
+        rows["hits"][which] += 1
+        rows["confirmed"][which] |= rows["hits"][which] >= self._params.confirm_hits
+        rows["seen_s"][which] = self._time_s
+        rows["sure_s"][which[detections.score >= self._params.high_score]] = self._time_s
+
+    def _end_lost(self) -> None:
+        unseen_s = self._time_s - self._rows["seen_s"]
+        patience_s = np.where(self._rows["confirmed"], self._params.max_coast_s, 0.0)
+        unsure_s = self._time_s - self._rows["sure_s"]
+        self._rows = self._rows[(unseen_s <= patience_s) & (unsure_s <= self._params.max_unsure_s)]
+
+    def _start(self, detections: Detections) -> None:
+        count = len(detections)
+        rows = np.zeros(count, _ROW)
+        motion.start(rows, motion.to_centre(detections.xyxy_px), self._params)
+        rows["track_id"] = np.arange(self._next_id, self._next_id + count)
+        rows["score"] = detections.score
+        rows["class_votes"][np.arange(count), detections.class_id] = detections.score
+        rows["hits"] = 1
+        rows["confirmed"] = math.isinf(self._looked_s) or self._params.confirm_hits == 1
+        rows["started_s"] = rows["seen_s"] = rows["sure_s"] = self._time_s
+        self._next_id += count
+        self._rows = np.concatenate([self._rows, rows])
+
+    @staticmethod
+    def _class_id(rows: motion.MotionArray) -> IntArray:
+        class_id: IntArray = rows["class_votes"].argmax(axis=1)
+        return class_id
+
+    def _report(self, *, rested: bool = False) -> Tracks:
+        unseen_s = self._time_s - self._rows["seen_s"]
+        rows = self._rows[self._rows["confirmed"] & (unseen_s <= self._params.max_coast_s)]
+        return Tracks(
+            track_id=rows["track_id"],
+            xyxy_px=motion.to_edges(rows["box"]),
+            score=rows["score"],
+            class_id=self._class_id(rows),
+            observed=(rows["seen_s"] == self._time_s) & (not rested),
+            age_s=self._time_s - rows["started_s"],
+        )

@@ -1,0 +1,115 @@
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from tolerances import DISTORTION_PX, ITERATED_INVERSE_PX
+
+from standoff.core.camera import Camera
+from standoff.core.homography import FloatArray
+
+_MATRIX = np.array([[535.9, 0.0, 342.3], [0.0, 536.4, 235.6], [0.0, 0.0, 1.0]])
+_LENS = np.array([-0.2664, -0.0386, 0.00178, -0.00028, 0.2384])
+_INSIDE = (st.floats(0.0, 639.0), st.floats(0.0, 479.0))
+
+
+def lens_camera() -> Camera:
+    return Camera(640, 480, _MATRIX, _LENS)
+
+
+def picture_grid(step: int = 20) -> FloatArray:
+    x, y = np.meshgrid(np.arange(0.0, 640.0, step), np.arange(0.0, 480.0, step))
+    return np.column_stack([x.ravel(), y.ravel()])
+
+
+@given(*_INSIDE)
+def test_distorting_an_undistorted_point_gives_it_back(x: float, y: float) -> None:
+    camera, point_px = lens_camera(), np.array([[x, y]])
+    np.testing.assert_allclose(camera.distort(camera.undistort(point_px)), point_px, atol=DISTORTION_PX)
+
+
+def test_undistortion_agrees_with_opencv_all_over_the_picture() -> None:
+    points_px = picture_grid()
+    stop = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 100, 1e-10)
+    opencv = cv2.undistortPointsIter(points_px[:, None], _MATRIX, _LENS, None, _MATRIX, stop)[:, 0]
+    np.testing.assert_allclose(lens_camera().undistort(points_px), opencv, atol=ITERATED_INVERSE_PX)
+
+
+def test_distortion_agrees_with_opencv_projection() -> None:
+    points_px = picture_grid()
+    rays = np.column_stack([(points_px - _MATRIX[:2, 2]) / np.diag(_MATRIX)[:2], np.ones(len(points_px))])
+    opencv = cv2.projectPoints(rays, np.zeros(3), np.zeros(3), _MATRIX, _LENS)[0][:, 0]
+    np.testing.assert_allclose(lens_camera().distort(points_px), opencv, atol=DISTORTION_PX)
+
+
+def test_a_camera_without_distortion_changes_nothing() -> None:
+    camera, points_px = Camera(640, 480, _MATRIX, np.zeros(5)), picture_grid()
+    np.testing.assert_allclose(camera.undistort(points_px), points_px, atol=DISTORTION_PX)
+    np.testing.assert_allclose(camera.distort(points_px), points_px, atol=DISTORTION_PX)
+
+
+def test_a_point_that_the_lens_cannot_see_is_nan_and_leaves_its_neighbours_alone() -> None:
+    # x (1 - 0.3 x^2) grows to 0.703 at x = 1.054 and falls afterwards: nothing is ever seen beyond 0.703.
+    barrel = Camera(640, 480, _MATRIX, np.array([-0.3, 0.0, 0.0, 0.0, 0.0]))
+    edge_px = _MATRIX[0, 0] * 2.0 / 3.0 / np.sqrt(0.9)
+    centre_px = _MATRIX[:2, 2]
+    points_px = centre_px + np.array([[edge_px * 0.99, 0.0], [edge_px * 1.01, 0.0], [3000.0, 0.0], [10.0, 0.0]])
+    undistorted = barrel.undistort(points_px)
+    assert np.isnan(undistorted).all(axis=1).tolist() == [False, True, True, False]
+    np.testing.assert_allclose(barrel.distort(undistorted[[0, 3]]), points_px[[0, 3]], atol=DISTORTION_PX)
+
+
+@given(st.floats(-3000.0, 3000.0), st.floats(-3000.0, 3000.0))
+def test_what_undistortion_returns_is_nan_or_true(x: float, y: float) -> None:
+    point_px = np.array([[x, y]])
+    undistorted = lens_camera().undistort(point_px)
+    if not np.isnan(undistorted).any():
+        np.testing.assert_allclose(lens_camera().distort(undistorted), point_px, atol=DISTORTION_PX)
+
+
+def test_nan_stays_nan_and_no_points_give_no_points() -> None:
+    assert np.isnan(lens_camera().undistort(np.array([[np.nan, 3.0]]))).all()
+    assert lens_camera().undistort(np.zeros((0, 2))).shape == (0, 2)
+    assert lens_camera().distort(np.zeros((0, 2))).shape == (0, 2)
+
+
+@given(*_INSIDE, st.sampled_from([(1280, 960), (320, 240), (1920, 1440)]))
+def test_scaling_the_picture_keeps_the_rays(x: float, y: float, size_px: tuple[int, int]) -> None:
+    camera = lens_camera()
+    scaled, factor = camera.scaled_to(*size_px), size_px[0] / 640.0
+    point_px = np.array([[x, y]])
+    resized_px = (point_px + 0.5) * factor - 0.5
+    ray = (camera.undistort(point_px) - camera.matrix[:2, 2]) / np.diag(camera.matrix)[:2]
+    resized_ray = (scaled.undistort(resized_px) - scaled.matrix[:2, 2]) / np.diag(scaled.matrix)[:2]
+    np.testing.assert_allclose(resized_ray, ray, atol=1e-9)
+
+
+def test_another_shape_of_picture_is_refused() -> None:
+    with pytest.raises(ValueError, match="aspect ratio"):
+        lens_camera().scaled_to(1920, 1080)
+
+
+@pytest.mark.parametrize(
+    ("matrix", "distortion"),
+    [
+        (np.eye(2), np.zeros(5)),
+        (_MATRIX, np.zeros(8)),
+        (_MATRIX * np.nan, np.zeros(5)),
+        (_MATRIX, np.full(5, np.inf)),
+        (np.diag([-500.0, 500.0, 1.0]), np.zeros(5)),
+    ],
+)
+def test_a_camera_that_cannot_be_is_refused(matrix: FloatArray, distortion: FloatArray) -> None:
+    with pytest.raises(ValueError, match=r"must be"):
+        Camera(640, 480, matrix, distortion)
+
+
+def test_a_camera_is_not_changed_by_changing_what_it_was_made_of() -> None:
+    matrix = _MATRIX.copy()
+    camera = Camera(640, 480, matrix, _LENS)
+    matrix[0, 0] = 1.0
+    assert camera.matrix[0, 0] == _MATRIX[0, 0]
+    with pytest.raises(ValueError, match="read-only"):
+        camera.matrix[0, 0] = 1.0

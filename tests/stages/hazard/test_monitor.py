@@ -1,0 +1,354 @@
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from standoff.core.types import GroundMap, GroundPositions, Hazard, NoGroundMap, Proximities
+from standoff.stages.hazard import HazardMonitor, HazardParams
+
+GROUND = GroundMap(np.eye(3), np.zeros((9, 9)), (1920, 1080), "exact", 0.02)
+NO_GROUND = NoGroundMap("reference not found")
+CUT_OFF = "cut off by the picture's edge"
+NAN = math.nan
+STEP_S = 0.125
+"""A step that floating point knows exactly."""
+CALM = HazardParams(min_duration_s=0.25, release_s=0.5, update_every_s=1000.0, unknown_after_s=1.0)
+
+Pair = tuple[int, int]
+Gaps = dict[Pair, float]
+
+
+def frame(gaps: Gaps, sigma_m: float = 0.1, order: Sequence[int] | None = None) -> tuple[GroundPositions, Proximities]:
+    """Return the rows of one frame; a gap of NaN is a pair that was not measured because one track is cut off."""
+    tracks = sorted({track for pair in gaps for track in pair})
+    lost = {track for track in tracks if all(math.isnan(gap) for pair, gap in gaps.items() if track in pair)}
+    valid = np.array([track not in lost for track in tracks], dtype=np.bool_)
+    count = len(tracks)
+    positions = GroundPositions(
+        track_id=np.array(tracks, dtype=np.int64),
+        class_id=np.zeros(count, dtype=np.int64),
+        xy_m=np.where(valid[:, None], 0.0, np.nan),
+        velocity_mps=np.zeros((count, 2)),
+        covariance_m2=np.zeros((count, 2, 2)),
+        map_factor_m=np.zeros((count, 2, 9)),
+        radius_m=np.zeros(count),
+        valid=valid,
+        reason=np.where(valid, "", CUT_OFF).astype(object),
+    )
+    pairs, gap_m = [*gaps], np.array([*gaps.values()], dtype=np.float64)
+    proximities = Proximities(
+        track_a=np.array([a for a, _ in pairs], dtype=np.int64),
+        track_b=np.array([b for _, b in pairs], dtype=np.int64),
+        distance_m=gap_m + 7.8,
+        gap_m=gap_m,
+        sigma_m=gap_m * 0.0 + sigma_m,
+        closing_mps=gap_m * 0.0,
+        time_to_contact_s=gap_m * np.nan,
+        filtered=np.zeros(len(pairs), dtype=np.bool_),
+    )
+    return positions, proximities if order is None else proximities[np.array(order, dtype=np.int64)]
+
+
+def events_of(
+    frames: Iterable[Gaps | NoGroundMap], params: HazardParams = CALM, *, step_s: float = STEP_S
+) -> list[Hazard]:
+    """Run a monitor over frames of gaps by pair; a missing map leaves pair (1, 2) unmeasured."""
+    monitor = HazardMonitor(params)
+    events: list[Hazard] = []
+    for index, gaps in enumerate(frames):
+        ground = gaps if isinstance(gaps, NoGroundMap) else GROUND
+        rows = frame({(1, 2): NAN} if isinstance(gaps, NoGroundMap) else gaps)
+        events += monitor.update(step_s * index, *rows, ground)
+    return events
+
+
+def pair_events(gaps_m: Iterable[float], params: HazardParams = CALM) -> list[Hazard]:
+    return events_of([{(1, 2): gap_m} for gap_m in gaps_m], params)
+
+
+def told(events: Iterable[Hazard]) -> list[tuple[str, str, float]]:
+    return [(event.phase, event.severity, event.time_s) for event in events]
+
+
+def test_a_breach_is_opened_as_danger_once_it_has_lasted_and_closed_once_it_is_over() -> None:
+    events = pair_events([10.0, *[-1.0] * 4, *[10.0] * 6])
+    assert told(events) == [
+        ("opened", "danger", 0.375),
+        ("updated", "warning", 1.125),
+        ("closed", "warning", 1.125),
+    ] or told(events) == [("opened", "danger", 0.375), ("closed", "danger", 1.125)]
+    assert {event.rule for event in events} == {"proximity"}
+    assert {event.track_ids for event in events} == {(1, 2)}
+    assert (events[0].gap_m, events[0].distance_m, events[0].sigma_m) == (-1.0, 6.8, 0.1)
+    assert events[-1].reason == "clear for 0.5 s"
+
+
+def test_within_the_buffer_it_is_a_warning_that_can_become_danger_and_back() -> None:
+    events = pair_events([*[0.5] * 4, *[-0.5] * 4, *[0.8] * 8, *[1.2] * 8, *[1.6] * 5])
+    assert told(events) == [
+        ("opened", "warning", 0.25),
+        ("updated", "danger", 0.75),
+        ("updated", "warning", 1.5),
+        ("closed", "warning", 3.5),
+    ]
+
+
+def test_a_single_bad_frame_is_no_alarm_unless_asked_for() -> None:
+    blip = [10.0, -5.0, 10.0, 10.0]
+    assert pair_events(blip) == []
+    assert pair_events(blip, HazardParams(min_duration_s=0.0))[0].severity == "danger"
+
+
+def test_noise_around_the_limit_does_not_flicker() -> None:
+    rng = np.random.default_rng(4)
+    events = pair_events(1.0 + rng.uniform(-0.4, 0.4, 400))
+    assert [event.phase for event in events] == ["opened"]
+
+
+def test_caution_takes_the_gap_smaller_by_sigmas() -> None:
+    params = HazardParams(caution_sigmas=2.0)
+    for sigma_m, expected in ((0.1, 0), (1.0, 1)):
+        monitor = HazardMonitor(params)
+        events = [e for i in range(5) for e in monitor.update(STEP_S * i, *frame({(1, 2): 2.0}, sigma_m), GROUND)]
+        assert len(events) == expected
+
+
+def test_a_cautious_monitor_cannot_measure_without_a_sigma() -> None:
+    monitor = HazardMonitor(HazardParams(caution_sigmas=2.0))
+    events = [e for i in range(12) for e in monitor.update(STEP_S * i, *frame({(1, 2): 9.0}, NAN), GROUND)]
+    assert [(event.phase, event.severity, event.reason) for event in events] == [("opened", "unknown", "not measured")]
+
+
+def test_a_lasting_hazard_is_reported_again_at_most_so_often() -> None:
+    events = pair_events([-1.0] * 33, HazardParams(min_duration_s=0.0, update_every_s=1.0))
+    assert told(events) == [
+        ("opened", "danger", 0.0),
+        *[("updated", "danger", time_s) for time_s in (1.0, 2.0, 3.0, 4.0)],
+    ]
+
+
+def test_an_open_hazard_that_cannot_be_measured_is_unknown_until_it_can() -> None:
+    events = pair_events([*[-1.0] * 4, *[NAN] * 20, *[-1.0] * 4])
+    assert told(events) == [
+        ("opened", "danger", 0.25),
+        ("unknown", "danger", 0.75),
+        ("updated", "danger", 3.0),
+    ]
+    assert len({event.hazard_id for event in events}) == 1
+    assert events[1].reason == CUT_OFF
+    assert math.isnan(events[1].distance_m) and math.isnan(events[1].gap_m) and math.isnan(events[1].sigma_m)
+    assert events[2].reason == ""
+
+
+def test_not_being_measured_never_counts_towards_the_end_of_a_hazard() -> None:
+    events = pair_events([*[-1.0] * 4, 10.0, *[NAN] * 40, 10.0, NAN, 10.0])
+    assert "closed" not in {event.phase for event in events}
+
+
+def test_a_breach_that_is_lost_from_sight_before_it_was_said_is_said_as_unknown() -> None:
+    events = pair_events([-1.0, *[NAN] * 4])
+    assert told(events) == [("opened", "unknown", 0.375)]
+
+
+def test_a_visible_pair_that_stays_unmeasured_opens_an_unknown_hazard() -> None:
+    events = pair_events([*[20.0] * 2, *[NAN] * 20, *[20.0] * 10])
+    assert told(events) == [("opened", "unknown", 1.25), ("closed", "unknown", 3.25)]
+    assert [event.reason for event in events] == [CUT_OFF, "clear for 0.5 s"]
+    assert math.isnan(events[0].gap_m)
+
+
+@pytest.mark.parametrize(
+    ("gap_m", "severities"), [(-1.0, ["warning", "danger"]), (0.5, ["warning"]), (1.2, ["warning"])]
+)
+def test_an_unknown_hazard_takes_its_level_as_soon_as_it_is_measured_near(gap_m: float, severities: list[str]) -> None:
+    events = pair_events([*[NAN] * 10, *[gap_m] * 6])
+    assert (events[0].phase, events[0].severity) == ("opened", "unknown")
+    assert [(event.phase, event.severity) for event in events[1:]] == [("updated", level) for level in severities]
+    assert events[1].time_s == 1.25
+
+
+def test_a_track_that_is_lost_leaves_its_hazard_unknown_for_a_while() -> None:
+    events = events_of([*[{(1, 2): -1.0}] * 4, *[{}] * 40])
+    assert told(events) == [
+        ("opened", "danger", 0.25),
+        ("unknown", "danger", 0.5),
+        ("closed", "danger", 3.5),
+    ]
+    assert [event.reason for event in events] == ["", "track lost", "track lost for 3 s"]
+
+
+def test_a_track_that_comes_back_in_time_keeps_its_hazard() -> None:
+    events = events_of([*[{(1, 2): -1.0}] * 4, *[{}] * 8, *[{(1, 2): -1.0}] * 3])
+    assert [event.phase for event in events] == ["opened", "unknown", "updated"]
+    assert len({event.hazard_id for event in events}) == 1
+
+
+def test_a_pair_that_is_no_longer_watched_says_so() -> None:
+    other: Gaps = {(1, 3): 30.0, (2, 3): 30.0}
+    events = events_of([*[{(1, 2): -1.0, **other}] * 4, *[other] * 2])
+    assert events[-1].reason == "pair not watched any more"
+
+
+def test_a_lost_pair_without_a_hazard_is_forgotten_silently() -> None:
+    assert events_of([*[{(1, 2): 20.0}] * 4, *[{}] * 40]) == []
+
+
+def test_a_stream_that_starts_without_a_map_says_so_at_once() -> None:
+    events = events_of([NO_GROUND] * 30)
+    assert told(events) == [("opened", "unknown", 0.0)]
+    assert (events[0].rule, events[0].track_ids, events[0].reason) == ("measurement", (), "reference not found")
+
+
+def test_a_map_that_is_lost_is_one_hazard_for_the_stream_and_unknown_for_open_pairs() -> None:
+    breach: Gaps = {(1, 2): -1.0}
+    events = events_of([*[breach] * 8, *[NO_GROUND] * 20, *[breach] * 8])
+    assert [(event.rule, event.phase, event.time_s) for event in events] == [
+        ("proximity", "opened", 0.25),
+        ("measurement", "opened", 1.25),
+        ("proximity", "unknown", 1.25),
+        ("proximity", "updated", 3.5),
+        ("measurement", "closed", 4.0),
+    ]
+    assert events[-1].reason == "ground map is back"
+
+
+def test_a_lost_map_opens_nothing_for_pairs_that_were_clear() -> None:
+    clear: Gaps = {(1, 2): 30.0}
+    events = events_of([*[clear] * 8, *[NO_GROUND] * 40])
+    assert [event.rule for event in events] == ["measurement"]
+
+
+def test_a_map_that_fails_in_one_frame_is_no_alarm() -> None:
+    clear: Gaps = {(1, 2): 30.0}
+    assert events_of([*[clear] * 8, NO_GROUND, *[clear] * 8]) == []
+
+
+def test_another_reason_for_the_missing_map_is_an_update() -> None:
+    stale = NoGroundMap("map is stale")
+    events = events_of([*[NO_GROUND] * 10, *[stale] * 10], HazardParams(update_every_s=1.0))
+    assert [(event.phase, event.reason, event.time_s) for event in events] == [
+        ("opened", "reference not found", 0.0),
+        ("updated", "map is stale", 1.25),
+    ]
+
+
+def test_the_end_of_the_stream_closes_everything_that_is_open() -> None:
+    monitor = HazardMonitor()
+    opened = [
+        event
+        for index in range(4)
+        for event in monitor.update(STEP_S * index, *frame({(1, 2): -1.0, (3, 4): 0.5, (5, 6): 30.0}), GROUND)
+    ]
+    closed = monitor.close(1.0)
+    assert [(event.phase, event.time_s, event.reason) for event in closed] == [("closed", 1.0, "end of stream")] * 2
+    assert [event.hazard_id for event in closed] == [event.hazard_id for event in opened]
+    assert [event.gap_m for event in closed] == [-1.0, 0.5]
+    assert monitor.close(1.0) == ()
+    unmapped = HazardMonitor()
+    unmapped.update(0.0, GroundPositions.empty(), Proximities.empty(), NO_GROUND)
+    assert [(event.rule, event.phase) for event in unmapped.close(0.1)] == [("measurement", "closed")]
+
+
+def test_a_reset_forgets_and_leaves_other_streams_alone() -> None:
+    first, second = HazardMonitor(CALM), HazardMonitor(CALM)
+    for monitor in (first, second):
+        for index in range(4):
+            monitor.update(STEP_S * index, *frame({(1, 2): -1.0}), GROUND)
+    first.reset()
+    assert first.close(1.0) == ()
+    assert len(second.close(1.0)) == 1
+
+
+GAP = st.one_of(st.floats(-3, 5), st.just(NAN))
+FRAME = st.one_of(
+    st.dictionaries(st.sampled_from([(1, 2), (1, 3), (2, 3)]), GAP, max_size=3),
+    st.sampled_from([NO_GROUND, NoGroundMap("map is stale")]),
+)
+FRAMES = st.lists(FRAME, min_size=5, max_size=60)
+
+
+@given(frames=FRAMES)
+def test_every_hazard_is_opened_first_and_closed_last_at_the_end_of_the_stream(
+    frames: list[Gaps | NoGroundMap],
+) -> None:
+    params = HazardParams(min_duration_s=0.125, release_s=0.25, unknown_after_s=0.5, unknown_timeout_s=0.5)
+    monitor = HazardMonitor(params)
+    events: list[Hazard] = []
+    for index, gaps in enumerate(frames):
+        ground = gaps if isinstance(gaps, NoGroundMap) else GROUND
+        rows = frame({(1, 2): NAN} if isinstance(gaps, NoGroundMap) else gaps)
+        events += monitor.update(STEP_S * index, *rows, ground)
+    events += monitor.close(STEP_S * len(frames))
+    lives: dict[str, list[Hazard]] = {}
+    for event in events:
+        lives.setdefault(event.hazard_id, []).append(event)
+    for life in lives.values():
+        phases = [event.phase for event in life]
+        assert (phases[0], phases[-1]) == ("opened", "closed")
+        assert set(phases[1:-1]) <= {"updated", "unknown"}
+        assert len({(event.rule, event.track_ids) for event in life}) == 1
+        assert all(earlier.time_s <= later.time_s for earlier, later in itertools.pairwise(life))
+        assert all(event.reason and math.isnan(event.gap_m) for event in life if event.phase == "unknown")
+
+
+def open_intervals(events: list[Hazard], end_s: float) -> dict[Pair, list[tuple[float, float]]]:
+    """Return by pair when a hazard was open."""
+    opened: dict[str, tuple[Pair, float]] = {}
+    spans: dict[Pair, list[tuple[float, float]]] = {}
+    for event in events:
+        if event.rule == "proximity" and event.phase == "opened":
+            opened[event.hazard_id] = ((event.track_ids[0], event.track_ids[1]), event.time_s)
+        elif event.rule == "proximity" and event.phase == "closed":
+            pair, start_s = opened.pop(event.hazard_id)
+            spans.setdefault(pair, []).append((start_s, event.time_s))
+    for pair, start_s in opened.values():
+        spans.setdefault(pair, []).append((start_s, end_s))
+    return spans
+
+
+@given(frames=FRAMES, buffer_m=st.floats(0, 2), wider_m=st.floats(0, 3), radius_m=st.floats(0, 3))
+def test_a_wider_buffer_or_radius_never_removes_a_hazard(
+    frames: list[Gaps | NoGroundMap], buffer_m: float, wider_m: float, radius_m: float
+) -> None:
+    def spans(buffer_m: float, radius_m: float) -> dict[Pair, list[tuple[float, float]]]:
+        params = HazardParams(
+            buffer_m=buffer_m, min_duration_s=0.125, release_s=0.25, unknown_after_s=0.5, unknown_timeout_s=0.5
+        )
+        nearer: list[Gaps | NoGroundMap] = [
+            gaps if isinstance(gaps, NoGroundMap) else {pair: gap_m - radius_m for pair, gap_m in gaps.items()}
+            for gaps in frames
+        ]
+        return open_intervals(events_of(nearer, params), STEP_S * len(frames))
+
+    wide = spans(buffer_m + wider_m, radius_m)
+    for pair, narrow_spans in spans(buffer_m, 0.0).items():
+        for start_s, end_s in narrow_spans:
+            assert any(first <= start_s and end_s <= last for first, last in wide.get(pair, []))
+
+
+@given(gaps=st.lists(st.dictionaries(st.sampled_from([(1, 2), (1, 3), (2, 3)]), GAP, min_size=3), max_size=30))
+def test_the_order_of_the_rows_does_not_matter(gaps: list[Gaps]) -> None:
+    straight, mixed = HazardMonitor(CALM), HazardMonitor(CALM)
+    for index, pairs in enumerate(gaps):
+        first = straight.update(STEP_S * index, *frame(pairs), GROUND)
+        second = mixed.update(STEP_S * index, *frame(pairs, order=[2, 0, 1]), GROUND)
+        assert [(e.track_ids, e.phase, e.severity) for e in first] == [
+            (e.track_ids, e.phase, e.severity) for e in second
+        ]
+
+
+@given(frames=FRAMES, factor=st.sampled_from([0.25, 2.0, 16.0]))
+def test_a_slower_clock_with_slower_settings_tells_the_same_story(
+    frames: list[Gaps | NoGroundMap], factor: float
+) -> None:
+    durations = {"min_duration_s": 0.25, "release_s": 0.5, "update_every_s": 1.0, "unknown_after_s": 1.0}
+    plain = HazardParams(**durations, unknown_timeout_s=2.0)
+    slow = HazardParams(**{name: factor * s for name, s in durations.items()}, unknown_timeout_s=2.0 * factor)
+    told_plain = [(p, s, t * factor) for p, s, t in told(events_of(frames, plain))]
+    assert told(events_of(frames, slow, step_s=STEP_S * factor)) == told_plain

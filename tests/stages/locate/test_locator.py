@@ -1,0 +1,203 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from stages.locate.oblique_world import SIZE_PX, ground_map, seen_px, standing, tracks_of
+from tolerances import GEOMETRY_REL, GROUND_THROUGH_LENS_M
+
+from standoff.core.classes import CLASSES
+from standoff.core.homography import FloatArray
+from standoff.core.types import GroundMap, NoGroundMap, Tracks
+from standoff.stages.locate import LocateParams, Locator
+
+GROUND_M = np.array([[0.0, 35.0], [-8.0, 28.0], [12.0, 45.0], [5.0, 60.0]])
+LENS = np.array([-0.12, 0.03, 0.001, -0.0008, 0.0])
+
+
+def box_with_foot_at(x: float, y: float) -> FloatArray:
+    return standing(np.array([[x, y]]))
+
+
+def test_the_bottom_centre_stands_where_the_entity_does() -> None:
+    positions = Locator().update(0.0, tracks_of(standing(seen_px(GROUND_M))), ground_map())
+    assert positions.valid.all()
+    assert (positions.reason == "").all()
+    np.testing.assert_allclose(positions.xy_m, GROUND_M, rtol=GEOMETRY_REL, atol=GEOMETRY_REL)
+
+
+def test_lens_distortion_is_removed_from_the_foot_point() -> None:
+    tracks = tracks_of(standing(seen_px(GROUND_M, LENS)))
+    positions = Locator().update(0.0, tracks, ground_map(distortion=LENS))
+    np.testing.assert_allclose(positions.xy_m, GROUND_M, atol=GROUND_THROUGH_LENS_M)
+    bare = Locator().update(0.0, tracks, ground_map())
+    assert np.abs(bare.xy_m - GROUND_M).max() > 0.1
+
+
+def test_the_box_centre_is_the_papers_anchor() -> None:
+    centre_px = seen_px(GROUND_M)
+    boxes = np.column_stack([centre_px - 15.0, centre_px + 15.0])
+    positions = Locator(LocateParams(anchor="box_centre")).update(0.0, tracks_of(boxes), ground_map())
+    np.testing.assert_allclose(positions.xy_m, GROUND_M, rtol=GEOMETRY_REL, atol=GEOMETRY_REL)
+
+
+def test_no_tracks_give_no_positions() -> None:
+    for ground in (ground_map(), ground_map(distortion=LENS), NoGroundMap("reference not found")):
+        assert len(Locator().update(0.0, Tracks.empty(), ground)) == 0
+
+
+def test_without_a_map_every_row_says_why() -> None:
+    tracks = tracks_of(standing(seen_px(GROUND_M)))
+    positions = Locator().update(0.0, tracks, NoGroundMap("reference not found"))
+    assert not positions.valid.any()
+    assert set(positions.reason) == {"no ground map: reference not found"}
+    for column in (positions.xy_m, positions.velocity_mps, positions.covariance_m2, positions.map_factor_m):
+        assert np.isnan(column).all()
+    np.testing.assert_array_equal(positions.track_id, tracks.track_id)
+    assert (positions.radius_m == 2.0).all()
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "reason"),
+    [
+        (960.0, 1079.0, "cut off by the picture's edge"),
+        (960.0, 1300.0, "cut off by the picture's edge"),
+        (10.0, 600.0, "cut off by the picture's edge"),
+        (1909.5, 600.0, "cut off by the picture's edge"),
+        (960.0, 1060.0, ""),
+        (960.0, 30.0, ""),
+        (40.0, 600.0, ""),
+    ],
+)
+def test_a_box_that_may_go_on_outside_the_picture_is_not_located(x: float, y: float, reason: str) -> None:
+    position = Locator().update(0.0, tracks_of(box_with_foot_at(x, y)), ground_map())
+    assert position.reason[0] == reason
+    assert position.valid[0] == (reason == "")
+
+
+def test_a_box_centre_moves_when_the_top_is_cut_off() -> None:
+    boxes = np.array([[900.0, 0.0, 930.0, 60.0]])
+    assert Locator().update(0.0, tracks_of(boxes), ground_map()).valid.all()
+    by_centre = Locator(LocateParams(anchor="box_centre")).update(0.0, tracks_of(boxes), ground_map())
+    assert by_centre.reason[0] == "cut off by the picture's edge"
+
+
+def test_an_edge_within_its_own_error_of_the_picture_edge_may_be_cut_off() -> None:
+    foot = np.array([[960.0, SIZE_PX[1] - 10.0]])
+    small, large = standing(foot, height_px=50.0), standing(foot, height_px=400.0)
+    assert Locator().update(0.0, tracks_of(small), ground_map()).valid.all()
+    assert not Locator().update(0.0, tracks_of(large), ground_map()).valid.any()
+
+
+HORIZON_PX = 200.0
+
+
+def map_with_a_horizon(covariance: FloatArray | None = None) -> GroundMap:
+    """Return a map whose horizon is picture row 200; its denominator grows by 0.001 a row."""
+    matrix = np.array([[0.03, 0.0, -28.8], [0.0, 0.0, 30.0], [0.0, 0.001, -0.001 * HORIZON_PX]])
+    return GroundMap(matrix, np.zeros((9, 9)) if covariance is None else covariance, SIZE_PX, "exact", 0.02)
+
+
+@pytest.mark.parametrize(
+    ("below_px", "reason"),
+    [
+        (-40.0, "beyond the horizon"),
+        (0.0, "beyond the horizon"),
+        (5.0, "too near the horizon"),
+        (40.0, ""),
+    ],
+)
+def test_a_foot_at_the_horizon_has_no_place(below_px: float, reason: str) -> None:
+    tracks = tracks_of(box_with_foot_at(960.0, HORIZON_PX + below_px))
+    position = Locator().update(0.0, tracks, map_with_a_horizon())
+    assert position.reason[0] == reason
+    assert np.isfinite(position.xy_m).all() == (reason == "")
+
+
+def test_an_uncertain_map_moves_the_horizon() -> None:
+    covariance = np.zeros((9, 9))
+    covariance[8, 8] = 0.02**2
+    tracks = tracks_of(box_with_foot_at(960.0, HORIZON_PX + 40.0))
+    assert Locator().update(0.0, tracks, map_with_a_horizon()).valid.all()
+    assert Locator().update(0.0, tracks, map_with_a_horizon(covariance)).reason[0] == "too near the horizon"
+
+
+def test_outside_the_maps_polygon_nothing_is_located() -> None:
+    polygon = np.array([[800.0, 400.0], [1200.0, 400.0], [1200.0, 800.0], [800.0, 800.0]])
+    tracks = tracks_of(standing(np.array([[1000.0, 600.0], [1300.0, 600.0]])))
+    positions = Locator().update(0.0, tracks, ground_map(valid_px=polygon))
+    assert positions.reason.tolist() == ["", "outside the ground map"]
+
+
+def test_a_point_that_the_lens_model_cannot_explain_is_not_located() -> None:
+    folded = np.array([-0.9, 0.0, 0.0, 0.0, 0.0])
+    tracks = tracks_of(standing(np.array([[960.0, 600.0], [1860.0, 1040.0]])))
+    positions = Locator().update(0.0, tracks, ground_map(distortion=folded))
+    assert positions.reason.tolist() == ["", "outside the lens model"]
+
+
+def test_the_covariance_is_the_boxes_share_and_the_maps() -> None:
+    rng = np.random.default_rng(5)
+    spread = rng.normal(size=(9, 8)) * 1e-7
+    ground = ground_map(covariance=spread @ spread.T)
+    tracks = tracks_of(standing(seen_px(GROUND_M)))
+    with_map = Locator().update(0.0, tracks, ground)
+    without = Locator().update(0.0, tracks, ground_map())
+    share = with_map.map_factor_m @ with_map.map_factor_m.transpose(0, 2, 1)
+    np.testing.assert_allclose(with_map.covariance_m2, without.covariance_m2 + share, rtol=GEOMETRY_REL)
+    assert (np.linalg.eigvalsh(share) > 0).all()
+    assert (without.map_factor_m == 0).all()
+
+
+def test_coasting_makes_a_position_less_sure_with_time() -> None:
+    boxes = standing(seen_px(GROUND_M[:1]))
+    locator = Locator()
+    seen = locator.update(0.0, tracks_of(boxes), ground_map()).covariance_m2[0]
+    early = locator.update(0.2, tracks_of(boxes, observed=[False]), ground_map()).covariance_m2[0]
+    late = locator.update(0.4, tracks_of(boxes, observed=[False]), ground_map()).covariance_m2[0]
+    again = locator.update(0.6, tracks_of(boxes), ground_map()).covariance_m2[0]
+    assert (np.linalg.eigvalsh(early - seen) > 0).all()
+    np.testing.assert_allclose(late - seen, 4.0 * (early - seen), rtol=GEOMETRY_REL)
+    np.testing.assert_array_equal(again, seen)
+
+
+def test_action_radii_come_from_the_class_then_the_settings_then_the_track() -> None:
+    params = LocateParams(radius_m={"excavator": 9.0}, track_radius_m={3: 20.0})
+    tracks = tracks_of(standing(seen_px(GROUND_M)), class_id=[0, 1, 1, 2])
+    assert Locator(params).update(0.0, tracks, ground_map()).radius_m.tolist() == [2.0, 9.0, 20.0, 5.8]
+
+
+def test_wrong_settings_are_named() -> None:
+    with pytest.raises(ValueError, match=r"no class is called crane; there are worker, excavator") as error:
+        LocateParams(radius_m={"crane": 3.0})
+    assert all(site_class.name in str(error.value) for site_class in CLASSES)
+    with pytest.raises(ValueError, match="action radius of worker must be a number of metres from 0, not -1"):
+        LocateParams(radius_m={"worker": -1.0})
+    with pytest.raises(ValueError, match="action radius of 7 must be a number of metres from 0, not nan"):
+        LocateParams(track_radius_m={7: float("nan")})
+    with pytest.raises(ValueError, match="velocity_min_span_s"):
+        LocateParams(velocity_window_s=0.2)
+
+
+def test_velocity_comes_from_observed_positions_and_is_unknown_where_invalid() -> None:
+    locator = Locator()
+    for step in range(11):
+        walked = GROUND_M[:1] + np.array([[1.4, 0.0]]) * (0.1 * step)
+        positions = locator.update(0.1 * step, tracks_of(standing(seen_px(walked))), ground_map())
+    np.testing.assert_allclose(positions.velocity_mps, [[1.4, 0.0]], atol=GEOMETRY_REL)
+    elsewhere = tracks_of(standing(seen_px(GROUND_M[1:2])), observed=[False])
+    np.testing.assert_allclose(
+        locator.update(1.1, elsewhere, ground_map()).velocity_mps, [[1.4, 0.0]], atol=GEOMETRY_REL
+    )
+    unmapped = locator.update(1.2, tracks_of(standing(seen_px(GROUND_M[:1]))), NoGroundMap("stale"))
+    assert np.isnan(unmapped.velocity_mps).all()
+
+
+def test_a_reset_forgets_and_leaves_other_streams_alone() -> None:
+    first, second = Locator(), Locator()
+    for step in range(6):
+        for locator in (first, second):
+            locator.update(0.1 * step, tracks_of(standing(seen_px(GROUND_M[:1]))), ground_map())
+    first.reset()
+    tracks = tracks_of(standing(seen_px(GROUND_M[:1])))
+    assert np.isnan(first.update(0.6, tracks, ground_map()).velocity_mps).all()
+    assert np.isfinite(second.update(0.6, tracks, ground_map()).velocity_mps).all()
