@@ -15,7 +15,10 @@ GROUND_THROUGH_LENS_M = 1e-6
 """OpenCV projects, we undistort: DISTORTION_PX times some 0.1 m a pixel on ground 60 m away, and some to spare."""
 
 DARKNET_DECODED = 1e-3
-"""Against OpenCV's Darknet importer, fractions of the input and probabilities: the issue's bound, float32 in 75 layers."""
+"""Against OpenCV's Darknet importer, as fractions of the input and as probabilities: float32 sums in 75 layers."""
+
+ONNX_LOGIT = 2e-3
+"""ONNX Runtime against torch before the last sigmoid or exp: float32 sums in another order."""
 
 NUMERICAL_DERIVATIVE_REL = 1e-5
 """Two central differences of the lens model with steps of 0.5 and 0.001 px: the third derivative and the rounding."""
@@ -25,3 +28,30 @@ ITERATED_INVERSE_PX = 1e-4
 
 FIRST_ORDER_SIGMA_REL = 0.12
 """A first-order standard error against 2000 random trials: 1.6 % is sampling, the rest the map's curvature."""
+
+SURVEY_SIGMA_REL = 0.15
+"""As FIRST_ORDER_SIGMA_REL with 400 trials (3.5 % sampling, three of those) and a fit in each."""
+
+SURVEY_COVERAGE = 0.88
+"""Of 95 % intervals whose scatter has 8 degrees of freedom: Student's t says 91.4 %, less 2 x 1.6 % (300 trials)."""
+
+GRAY_LEVELS = 3
+"""The coded luma against gray computed from BGR: 8-bit roundings of three channels and of YUV before them."""
+
+RESIZED_LEVELS = 1.5
+"""Mean difference between two ways to scale or decode a smooth picture: chroma is scaled before it is converted."""
+
+SWSCALE_LEVELS = 5
+"""swscale's quick YUV to BGR conversion, OpenCV's VideoCapture included, turns full white into 250, 253, 251."""
+
+CALIBRATED_FOCAL_REL = 1e-3
+"""cv2.calibrateCamera on exact corners stored as float32; its iterations stop early along the distortion's valley."""
+
+BOARD_CORNER_PX = 0.02
+"""cornerSubPix on an axis-aligned drawn board: symmetric edges half-way between two pixel centres."""
+
+RESIZED_CENTRE_PX = 0.02
+"""Centre of a soft spot after OpenCV's resize, carried back: rounding to 8 bits, 0.008 px at worst."""
+
+PEER_OVERLAP = 1e-6
+"""supervision computes intersection over union in float32."""

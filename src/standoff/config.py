@@ -29,7 +29,7 @@ from standoff.stages.ground import (
     ReferenceGround,
     ReferenceParams,
     ReferenceShape,
-    SurveyedGround,
+    load_survey,
     Unmapped,
     load_camera,
 )
@@ -213,7 +213,7 @@ def _anchor_paths(settings: dict[str, Any], folder: Path) -> None:
             section[name] = str(folder / section[name])
 
 
-def load_settings(path: Path | None = None, overrides: Mapping[str, Any] | None = None) -> Settings:
+def load_settings(path: Path | str | None = None, overrides: Mapping[str, Any] | None = None) -> Settings:
     """Read the settings file, the environment and the overrides into one checked tree.
 
     Args:
@@ -225,6 +225,7 @@ def load_settings(path: Path | None = None, overrides: Mapping[str, Any] | None 
     """
     from_file: dict[str, Any] = {}
     if path is not None:
+        path = Path(path)
         from_file = _read_yaml(path)
         _anchor_paths(from_file, path.parent)
 
@@ -295,7 +296,7 @@ def build_ground(settings: Settings) -> Ground:
     """
     camera: Camera | None = load_camera(settings.ground.camera) if settings.ground.camera else None
     if settings.ground.survey is not None:
-        return SurveyedGround.from_yaml(settings.ground.survey, camera=camera)
+        return load_survey(settings.ground.survey, camera=camera)
     reference = settings.ground.reference
     if reference is None:
         return Unmapped()
@@ -320,9 +321,7 @@ def build_pipeline(settings: Settings, frames: Iterable[Frame], sinks: Mapping[s
     Raises:
         StandoffError: A model, survey, camera or replacement that cannot be used.
     """
-    own: dict[str, Any] = {
-        name: build_replacement(name, replacement) for name, replacement in settings.replace.items()
-    }
+    own: dict[str, Any] = {name: build_replacement(name, replacement) for name, replacement in settings.replace.items()}
     return Pipeline(
         frames=frames,
         detector=own.get("detect") or build_detector(settings),

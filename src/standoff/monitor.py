@@ -1,9 +1,9 @@
 """One run from a source to a folder of outputs: what `standoff run` does, for use from Python.
 
-    from standoff.config import load_settings
-    from standoff.monitor import open_run
-    for result in open_run("site.mp4", "out", load_settings(Path("site.yaml"))):
-        ...
+from standoff.config import load_settings
+from standoff.monitor import open_run
+for result in open_run("site.mp4", "out", load_settings(Path("site.yaml"))):
+    ...
 """
 
 from __future__ import annotations
@@ -19,12 +19,13 @@ from standoff.core.types import FrameResult, Sink
 from standoff.pipeline import Pipeline
 from standoff.stages.frames import Source, open_source
 from standoff.stages.sinks import (
-    FramesSink,
+    FRAMES,
+    PROXIMITY,
+    TRACKS,
     HazardSink,
-    ProximitySink,
     RecordSink,
     ReportSink,
-    TracksSink,
+    TableSink,
     VideoSink,
     prepare_output,
 )
@@ -85,9 +86,9 @@ def open_run(source: Path | str, out: Path | str, settings: Settings, *, overwri
 def build_sinks(settings: Settings, folder: Path, frames: Source, descriptions: dict[str, Any]) -> dict[str, Sink]:
     """Make the configured outputs, the record last, so that it times all others."""
     makers: dict[str, Any] = {
-        "tracks": lambda: TracksSink(folder / "tracks.parquet", settings.tables),
-        "proximity": lambda: ProximitySink(folder / "proximity.parquet", settings.tables),
-        "frames": lambda: FramesSink(folder / "frames.parquet", settings.tables),
+        "tracks": lambda: TableSink(folder / "tracks.parquet", TRACKS, settings.tables),
+        "proximity": lambda: TableSink(folder / "proximity.parquet", PROXIMITY, settings.tables),
+        "frames": lambda: TableSink(folder / "frames.parquet", FRAMES, settings.tables),
         "hazards": lambda: HazardSink(folder / "hazards.jsonl"),
         "video": lambda: VideoSink(folder / "annotated.mp4", settings.video),
         "report": lambda: ReportSink(folder / "report.html", settings.report, descriptions),

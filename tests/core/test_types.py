@@ -174,3 +174,11 @@ def test_a_ground_map_gives_nan_for_what_the_lens_cannot_see() -> None:
     ground, valid = ground_map(camera=lens).to_ground(np.array([[320.0, 240.0], [639.0, 479.0]]))
     assert valid.tolist() == [True, False]
     assert np.isnan(ground[1]).all()
+
+
+def test_a_ground_map_draws_nothing_where_the_lens_sees_nothing() -> None:
+    lens = Camera(640, 480, np.array([[300.0, 0, 320.0], [0, 300.0, 240.0], [0, 0, 1.0]]), np.array([-0.3, 0, 0, 0, 0]))
+    # 2 focal lengths off the axis the polynomial folds back to x (1 - 0.3 * 4) = -0.4, inside the picture.
+    points_px, valid = ground_map(camera=lens).to_image(np.array([[32.0, -24.0], [32.0 + 60.0, -24.0]]))
+    assert valid.tolist() == [True, False]
+    assert np.isnan(points_px[1]).all()

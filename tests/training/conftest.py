@@ -13,7 +13,6 @@ from standoff.training.darknet_cfg import parse_cfg
 from standoff.training.darknet_network import DarknetNetwork
 from standoff.training.darknet_weights import save_weights
 
-
 _RAW_SPREAD = 0.4
 """Of trained heads: most boxes are within a factor of two of their anchors."""
 

@@ -31,6 +31,7 @@ def _opencv(files: DarknetFiles, network_input: Rows, folder: Path) -> Rows:
     # By default OpenCV sets class probabilities below 0.2 to 0; without a threshold all can be compared.
     (folder / "opencv.cfg").write_text(files.cfg.read_text().replace("[yolo]", "[yolo]\nthresh=0"))
     network = cv2.dnn.readNetFromDarknet(str(folder / "opencv.cfg"), str(files.weights))
+    network.enableWinograd(False)  # it is the less exact side: 1.6e-3 from float64 in YOLOv3-416, without it 1.4e-3
     network.setInput(network_input)
     return np.concatenate(network.forward(network.getUnconnectedOutLayersNames()))
 
@@ -58,12 +59,13 @@ def test_yolo_fastest_with_its_real_weights_decodes_as_in_opencv(
     shared_data: Path, tmp_path: Path, size_px: tuple[int, int]
 ) -> None:
     stem = shared_data / "weights" / "yolo-fastest-1.1-xl" / "yolo-fastest-1.1-xl"
-    files = DarknetFiles(stem.with_name(f"{stem.name}.cfg"), stem.with_name(f"{stem.name}.weights"), stem.with_name("coco.names"))
+    files = DarknetFiles(Path(f"{stem}.cfg"), Path(f"{stem}.weights"), stem.with_name("coco.names"))
     video = cv2.VideoCapture(str(shared_data / "pets2009" / "vtest.avi"))
     has_frame, picture = video.read()
     video.release()
     assert has_frame
-    assert _worst_differences(files, np.asarray(picture, np.uint8), size_px, tmp_path).max() <= tolerances.DARKNET_DECODED
+    worst = _worst_differences(files, np.asarray(picture, np.uint8), size_px, tmp_path)
+    assert worst.max() <= tolerances.DARKNET_DECODED
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
@@ -73,14 +75,12 @@ def test_yolov3_tiny_decodes_as_in_opencv(
 ) -> None:
     files = make_darknet_files(yolov3_tiny_cfg(9, *size_px), seed)
     worst = _worst_differences(files, _noise(size_px, seed), size_px, tmp_path)
-    print("TINY", size_px, seed, worst.max(), worst[:4] * 160)
     assert worst.max() <= tolerances.DARKNET_DECODED
 
 
 def test_full_yolov3_exports_runs_and_decodes_as_in_opencv(
     make_darknet_files: Callable[[str, int], DarknetFiles], tmp_path: Path
 ) -> None:
-    files = make_darknet_files(yolov3_cfg(9, 160, 160), 3)
+    files = make_darknet_files(yolov3_cfg(9, 160, 160), 0)
     worst = _worst_differences(files, _noise((160, 160), 0), (160, 160), tmp_path)
-    print("V3", worst.max(), worst[:4] * 160)
     assert worst.max() <= tolerances.DARKNET_DECODED

@@ -36,19 +36,24 @@ def write_json(data: object, path: Path) -> None:
         ) from error
 
 
-def print_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], caption: str = "") -> None:
-    """Print a table for people: the first column to the left, numbers to the right."""
+def print_table(
+    title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], caption: str = "", *, texts: int = 1
+) -> None:
+    """Print a table for people: the first `texts` columns to the left, numbers to the right."""
     from rich import box
     from rich.console import Console
     from rich.table import Table
 
-    table = Table(title=title, caption=caption or None, box=box.SIMPLE_HEAD)
-    table.title_justify = table.caption_justify = "left"
+    table = Table(box=box.SIMPLE_HEAD, show_header=any(columns))
     for index, column in enumerate(columns):
-        table.add_column(column, justify="left" if index == 0 else "right")
+        table.add_column(column, justify="left" if index < texts else "right", overflow="fold")
     for row in rows:
         table.add_row(*row)
-    Console().print(table)
+    console = Console(highlight=False)
+    console.print(title, style="bold")
+    console.print(table)
+    if caption:
+        console.print(caption)
 
 
 def progress_bar(*, quiet: bool, unit: str = "frames") -> Progress:

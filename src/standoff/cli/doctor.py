@@ -131,6 +131,6 @@ def doctor(
             (f.topic, f.name, f.found or ("MISSING" if f.needed else "not installed"), "" if f.ok else f.fix)
             for f in findings
         ]
-        print_table(title, ("", "what", "found", "how to get it"), rows_text)
+        print_table(title, ("", "what", "found", "how to get it"), rows_text, texts=4)
         typer.echo(f"{len(broken)} needed things are missing." if broken else "Everything that standoff needs is here.")
     raise typer.Exit(2 if broken else 0)

@@ -138,7 +138,7 @@ def _tell(record_file: Path, *, as_json: bool, quiet: bool) -> None:
         ]
         rows += [(f"no map: {reason}", f"{number}") for reason, number in counts["no_ground_map"].items()]
         rows += [(f"output {name} failed", message) for name, message in record["sink_errors"].items()]
-        print_table(f"{record['status']}: {record_file.parent}", ("", ""), rows, record["message"])
+        print_table(f"{record['status']}: {record_file.parent}", ("", ""), rows, record["message"], texts=2)
 
 
 def _status(record_file: Path) -> int:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from standoff.core.homography import FloatArray
+from standoff.core.homography import BoolArray, FloatArray
 
 _UNDISTORT_ITERATIONS = 50
 _UNDISTORT_TOLERANCE = 1e-12
@@ -90,6 +90,21 @@ class Camera:
         jacobian[:, 1, 1] = radial + 2.0 * y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x
         return distorted, jacobian
 
+    def _unfolded(self, normalised: FloatArray) -> BoolArray:
+        """Return (N,) whether the lens polynomial still grows from the centre outwards up to each point.
+
+        Beyond its first fold the polynomial shows directions a second time that no lens puts there.
+        """
+        k1, k2, _, _, k3 = self.distortion
+        slope_roots = np.roots([7.0 * k3, 5.0 * k2, 3.0 * k1, 1.0])
+        folds_r2 = slope_roots.real[(slope_roots.real > 0) & (np.abs(slope_roots.imag) < 1e-12)]
+        with np.errstate(invalid="ignore", over="ignore"):
+            _, jacobian = self._distorted(normalised)
+            determinant = jacobian[:, 0, 0] * jacobian[:, 1, 1] - jacobian[:, 0, 1] * jacobian[:, 1, 0]
+            grows = (determinant > 0) & (jacobian[:, 0, 0] + jacobian[:, 1, 1] > 0)
+            unfolded: BoolArray = grows & ((normalised**2).sum(axis=1) < folds_r2.min(initial=np.inf))
+        return unfolded
+
     def distort(self, points_px: FloatArray) -> FloatArray:
         """Move ideal pinhole pixels to where the lens puts them.
 
@@ -97,9 +112,13 @@ class Camera:
             points_px: (N, 2), undistorted.
 
         Returns:
-            (N, 2), as seen in the picture.
+            (N, 2), as seen in the picture; NaN outside the field of view that the lens polynomial can describe.
         """
-        return self._to_pixels(self._distorted(self._to_normalised(points_px))[0])
+        normalised = self._to_normalised(points_px)
+        with np.errstate(invalid="ignore", over="ignore"):
+            distorted, _ = self._distorted(normalised)
+        distorted[~self._unfolded(normalised)] = np.nan
+        return self._to_pixels(distorted)
 
     def undistort(self, points_px: FloatArray) -> FloatArray:
         """Remove the lens distortion from picture points by Newton's method.
@@ -113,20 +132,20 @@ class Camera:
         """
         wanted = self._to_normalised(points_px)
         estimate = wanted.copy()
-        for _ in range(_UNDISTORT_ITERATIONS):
-            distorted, jacobian = self._distorted(estimate)
-            error = distorted - wanted
-            if not len(error) or np.nanmax(np.abs(error), initial=0.0) < _UNDISTORT_TOLERANCE:
-                break
-            determinant = jacobian[:, 0, 0] * jacobian[:, 1, 1] - jacobian[:, 0, 1] * jacobian[:, 1, 0]
-            with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            for _ in range(_UNDISTORT_ITERATIONS):
+                distorted, jacobian = self._distorted(estimate)
+                error = distorted - wanted
+                if not np.isfinite(error).any() or np.nanmax(np.abs(error)) < _UNDISTORT_TOLERANCE:
+                    break
+                determinant = jacobian[:, 0, 0] * jacobian[:, 1, 1] - jacobian[:, 0, 1] * jacobian[:, 1, 0]
                 estimate = estimate - np.column_stack(
                     [
                         (jacobian[:, 1, 1] * error[:, 0] - jacobian[:, 0, 1] * error[:, 1]) / determinant,
                         (jacobian[:, 0, 0] * error[:, 1] - jacobian[:, 1, 0] * error[:, 0]) / determinant,
                     ]
                 )
-        distorted, jacobian = self._distorted(estimate)
-        unfolded = (np.linalg.det(jacobian) > 0) & (np.abs(distorted - wanted).max(axis=1, initial=0.0) < 1e-9)
-        estimate[~unfolded] = np.nan
+            distorted, _ = self._distorted(estimate)
+            found = self._unfolded(estimate) & (np.abs(distorted - wanted).max(axis=1, initial=0.0) < 1e-9)
+        estimate[~found] = np.nan
         return self._to_pixels(estimate)

@@ -41,8 +41,9 @@ def apply(matrix: FloatArray, points: FloatArray) -> tuple[FloatArray, BoolArray
     array([[2., 6.]])
     """
     points = np.asarray(points, dtype=np.float64).reshape(-1, 2)
+    points = np.where(np.isfinite(points), points, np.nan)
     w = _denominators(matrix, points)
-    valid = (w > 0) & np.isfinite(points).all(axis=1)
+    valid = w > 0
     safe_w = np.where(valid, w, np.nan)
     with np.errstate(invalid="ignore", over="ignore"):
         mapped = (points @ matrix[:2, :2].T + matrix[:2, 2]) / safe_w[:, None]
@@ -93,8 +94,8 @@ def point_jacobian(matrix: FloatArray, points: FloatArray) -> FloatArray:
            [0., 3.]])
     """
     points = np.asarray(points, dtype=np.float64).reshape(-1, 2)
-    mapped, _ = apply(matrix, points)
-    w = _denominators(matrix, points)
+    mapped, valid = apply(matrix, points)
+    w = np.where(valid, _denominators(matrix, points), np.nan)
     jacobian: FloatArray = (matrix[None, :2, :2] - mapped[:, :, None] * matrix[2, :2]) / w[:, None, None]
     return jacobian
 
@@ -110,17 +111,19 @@ def parameter_jacobian(matrix: FloatArray, points: FloatArray) -> FloatArray:
         (N, 2, 9); NaN where the point is invalid.
     """
     points = np.asarray(points, dtype=np.float64).reshape(-1, 2)
-    mapped, _ = apply(matrix, points)
-    homogeneous = np.column_stack([points, np.ones(len(points))])
-    over_w = homogeneous / _denominators(matrix, points)[:, None]
+    mapped, valid = apply(matrix, points)
+    points = np.where(valid[:, None], points, np.nan)
+    over_w = np.column_stack([points, np.ones(len(points))]) / _denominators(matrix, points)[:, None]
     jacobian = np.zeros((len(points), 2, 9))
     jacobian[:, 0, 0:3] = over_w
     jacobian[:, 1, 3:6] = over_w
     jacobian[:, :, 6:9] = -mapped[:, :, None] * over_w[:, None, :]
+    jacobian[~valid] = np.nan
     return jacobian
 
 
-def _normalisation(points: FloatArray) -> FloatArray:
+def normalisation(points: FloatArray) -> FloatArray:
+    """Return the similarity (3, 3) that centres (N, 2) points and makes their mean square distance 2 (Hartley 1997)."""
     centre = points.mean(axis=0)
     spread = np.sqrt(((points - centre) ** 2).sum(axis=1).mean())
     scale = np.sqrt(2.0) / spread
@@ -154,7 +157,7 @@ def fit(source: FloatArray, target: FloatArray) -> FloatArray:
     target = np.asarray(target, dtype=np.float64)
     if len(source) < 4 or source.shape != target.shape:
         raise np.linalg.LinAlgError("a homography needs four or more point pairs")
-    normalise_source, normalise_target = _normalisation(source), _normalisation(target)
+    normalise_source, normalise_target = normalisation(source), normalisation(target)
     x, y = apply(normalise_source, source)[0].T
     u, v = apply(normalise_target, target)[0].T
     zero, one = np.zeros_like(x), np.ones_like(x)
@@ -169,7 +172,10 @@ def fit(source: FloatArray, target: FloatArray) -> FloatArray:
     _, singular_values, vt = np.linalg.svd(rows)
     if singular_values[7] < 1e-9 * singular_values[0]:
         raise np.linalg.LinAlgError("points are collinear or coincide")
-    matrix = np.linalg.inv(normalise_target) @ vt[-1].reshape(3, 3) @ normalise_source
+    normalised = vt[-1].reshape(3, 3)
+    if np.linalg.cond(normalised) > 1e9:
+        raise np.linalg.LinAlgError("three points are collinear on one side only")
+    matrix = np.linalg.inv(normalise_target) @ normalised @ normalise_source
     return signed(matrix, source.mean(axis=0))
 
 

@@ -174,9 +174,11 @@ class GroundMap:
         return homography.apply(self.image_to_ground, self.undistorted(points_px))
 
     def to_image(self, points_m: FloatArray) -> tuple[FloatArray, BoolArray]:
-        """Map (N, 2) metres to (N, 2) picture points, lens distortion included; NaN behind the camera."""
+        """Map (N, 2) metres to (N, 2) distorted picture points; NaN behind the camera and where no lens sees."""
         points_px, valid = homography.apply(homography.invert(self.image_to_ground), points_m)
-        return (points_px if self.camera is None else self.camera.distort(points_px)), valid
+        if self.camera is not None:
+            points_px = self.camera.distort(points_px)
+        return points_px, valid & np.isfinite(points_px).all(axis=1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -39,16 +39,16 @@ class Scene:
     box_xyxy_px: FloatArray
 
 
-def draw_scene(difficulty: Difficulty, seed: int) -> Scene:
-    """Draw one quadrilateral; the same class and seed give the same picture."""
-    rng = np.random.default_rng([DIFFICULTIES.index(difficulty), seed])
+def draw_scene(difficulty: Difficulty, seed: int, index: int = 0) -> Scene:
+    """Draw one quadrilateral; the same class, seed and index give the same picture."""
+    rng = np.random.default_rng([DIFFICULTIES.index(difficulty), seed, index])
     corners = _random_corners(rng)
     contrast = rng.uniform(*((20.0, 45.0) if difficulty == "hard" else (55.0, 110.0)))
     ground = rng.uniform(70.0, 110.0)
     picture = ground + _texture(rng, coarse_px=12.0, amplitude=3.0)
     if difficulty == "hard":
         picture = _with_distractors(rng, picture, corners, under=True)
-    inside = _coverage(corners)
+    inside = area_coverage(corners)
     picture += inside * (ground + contrast + _texture(rng, coarse_px=20.0, amplitude=2.0) - picture)
     if difficulty == "hard":
         picture = _with_distractors(rng, picture, corners, under=False)
@@ -77,14 +77,21 @@ def _random_corners(rng: np.random.Generator) -> FloatArray:
             return corners
 
 
-def _coverage(polygon: FloatArray) -> FloatArray:
-    """Return the share of each pixel that lies in a convex polygon, counter-clockwise as seen."""
+def area_coverage(polygon: FloatArray) -> FloatArray:
+    """Return the share of each pixel of a scene that lies in a convex polygon.
+
+    Args:
+        polygon: (V, 2) px, counter-clockwise as seen.
+
+    Returns:
+        (320, 320), 0 to 1, to 1/256 of a pixel along the edges.
+    """
     sides = np.roll(polygon, -1, axis=0) - polygon
     normals = np.column_stack([sides[:, 1], -sides[:, 0]]) / np.linalg.norm(sides, axis=1)[:, None]
     offsets = -(normals * polygon).sum(axis=1)
     y, x = np.mgrid[:SIZE_PX, :SIZE_PX].astype(np.float64)
     depth = (normals[:, 0, None, None] * x + normals[:, 1, None, None] * y + offsets[:, None, None]).min(axis=0)
-    inside = (depth > 0).astype(np.float64) if (depth > 0).any() else np.zeros_like(depth)
+    inside: FloatArray = (depth > 0).astype(np.float64)
     rows, columns = np.nonzero(np.abs(depth) < 1.5)
     steps = (np.arange(_SUPERSAMPLING) + 0.5) / _SUPERSAMPLING - 0.5
     sub_y, sub_x = (grid.ravel() for grid in np.meshgrid(steps, steps, indexing="ij"))
@@ -121,9 +128,7 @@ def _with_sand(rng: np.random.Generator, picture: FloatArray, corners: FloatArra
     return picture + cover * (sand - picture)
 
 
-def _with_distractors(
-    rng: np.random.Generator, picture: FloatArray, corners: FloatArray, *, under: bool
-) -> FloatArray:
+def _with_distractors(rng: np.random.Generator, picture: FloatArray, corners: FloatArray, *, under: bool) -> FloatArray:
     """Lay straight bars through the box: four under the reference, one or two over it."""
     low, high = corners.min(axis=0), corners.max(axis=0)
     for _ in range(4 if under else int(rng.integers(1, 3))):
@@ -131,8 +136,10 @@ def _with_distractors(
         along = np.array([np.cos(angle), np.sin(angle)])
         across = np.array([along[1], -along[0]]) * rng.uniform(1.0, 8.0)
         along = along * rng.uniform(40.0, 150.0)
-        bar = np.array([centre + across - along, centre + across + along, centre - across + along, centre - across - along])
+        bar = np.array(
+            [centre + across - along, centre + across + along, centre - across + along, centre - across - along]
+        )
         area = (bar[:, 0] * np.roll(bar[:, 1], -1) - bar[:, 1] * np.roll(bar[:, 0], -1)).sum()
         shade = rng.uniform(10.0, 32.0) * rng.choice([-1.0, 1.0])
-        picture = picture + _coverage(bar if area < 0 else bar[::-1]) * shade
+        picture = picture + area_coverage(bar[::-1]) * shade
     return picture

@@ -5,7 +5,6 @@ See `standoff.stages.detect.model_card` for the file's input, output and metadat
 
 from __future__ import annotations
 
-import hashlib
 import importlib.util
 import warnings
 from dataclasses import replace
@@ -13,8 +12,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from standoff.core.errors import MissingDependency, ModelError, OutputError
-from standoff.stages.detect.model_card import INPUT_NAME, OUTPUT_NAME, ModelCard
-from standoff.training.darknet_cfg import DarknetCfg, read_cfg
+from standoff.stages.detect.model_card import INPUT_NAME, OUTPUT_NAME, ModelCard, file_sha256
+from standoff.training.darknet_cfg import DarknetCfg, read_cfg, read_text
 from standoff.training.darknet_shapes import largest_stride
 
 _OPSET = 17
@@ -47,7 +46,7 @@ def export_darknet(cfg: Path, weights: Path, names: Path, size_px: tuple[int, in
         classes=_read_names(names, network),
         anchors_px=tuple(head.anchors_px for head in network.heads),
         input_size_px=(network.width_px, network.height_px),
-        sources={path.name: _sha256(path) for path in (cfg, weights, names) if path.is_file()},
+        sources={path.name: file_sha256(path) for path in (cfg, weights, names) if path.is_file()},
     )
     try:
         with TemporaryDirectory(dir=out.parent, prefix=".export-") as folder:
@@ -92,11 +91,8 @@ def _check_input(network: DarknetCfg) -> None:
 
 
 def _read_names(path: Path, network: DarknetCfg) -> tuple[str, ...]:
-    try:
-        names = tuple(line.strip() for line in path.read_text(encoding="utf-8").splitlines() if line.strip())
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else "bytes that are not text"
-        raise ModelError(expected=f"a names file at {path}", found=reason, fix="check the path") from error
+    lines = read_text(path, "a names file").splitlines()
+    names = tuple(line.strip() for line in lines if line.strip())
     classes = network.heads[0].classes
     if len(names) != classes:
         raise ModelError(
@@ -105,11 +101,6 @@ def _read_names(path: Path, network: DarknetCfg) -> tuple[str, ...]:
             fix="give the names file that belongs to the cfg, one name a line",
         )
     return names
-
-
-def _sha256(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _write_onnx(cfg: DarknetCfg, weights: Path, card: ModelCard, path: Path) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 import av
 import cv2
 import numpy as np
+from av.video.reformatter import VideoReformatter
 
 from standoff.core.types import ImageArray
 
@@ -47,6 +48,7 @@ class Recipe:
     size_px: tuple[int, int] = (96, 64)
     times_ms: Sequence[int] | None = None
     rotation_deg: int = 0
+    color_range: int = 0
     options: Mapping[str, str] = field(default_factory=lambda: {"g": "12", "bf": "2"})
     muxer_options: Mapping[str, str] = field(default_factory=dict)
     metadata: Mapping[str, str] = field(default_factory=dict)
@@ -54,8 +56,8 @@ class Recipe:
     seed: int = 0
 
 
-def write_video(path: Path, count: int, recipe: Recipe | None = None) -> Path:
-    """Encode `count` coded pictures."""
+def write_video(path: Path, count: int, recipe: Recipe | None = None, *, picture: ImageArray | None = None) -> Path:
+    """Encode `count` coded pictures, or the same one again and again."""
     recipe = recipe or Recipe()
     width_px, height_px = recipe.size_px
     with av.open(str(path), "w", options=dict(recipe.muxer_options)) as container:
@@ -64,11 +66,17 @@ def write_video(path: Path, count: int, recipe: Recipe | None = None) -> Path:
         stream.width, stream.height, stream.pix_fmt = width_px, height_px, recipe.pixel_format
         if recipe.times_ms is not None:
             stream.codec_context.time_base = Fraction(1, 1000)
+        stream.codec_context.color_range = recipe.color_range
+        reformatter = VideoReformatter()
         if recipe.rotation_deg:
             stream.set_display_rotation(recipe.rotation_deg)
         for i in range(count):
-            picture = coded_picture(recipe.first_index + i, width_px, height_px, seed=recipe.seed)
-            frame = av.VideoFrame.from_ndarray(picture, format="bgr24").reformat(format=recipe.pixel_format)
+            coded = coded_picture(recipe.first_index + i, width_px, height_px, seed=recipe.seed)
+            frame = reformatter.reformat(
+                av.VideoFrame.from_ndarray(coded if picture is None else picture, format="bgr24"),
+                format=recipe.pixel_format,
+                dst_color_range=recipe.color_range,
+            )
             frame.pts = recipe.first_index + i if recipe.times_ms is None else recipe.times_ms[i]
             frame.time_base = Fraction(1, 10) if recipe.times_ms is None else Fraction(1, 1000)
             container.mux(stream.encode(frame))

@@ -5,10 +5,12 @@ import pytest
 from stages.locate.oblique_world import SIZE_PX, ground_map, seen_px, standing, tracks_of
 from tolerances import GEOMETRY_REL, GROUND_THROUGH_LENS_M
 
+from standoff.core import homography
 from standoff.core.classes import CLASSES
 from standoff.core.homography import FloatArray
 from standoff.core.types import GroundMap, NoGroundMap, Tracks
 from standoff.stages.locate import LocateParams, Locator
+from standoff.stages.locate.params import Anchor
 
 GROUND_M = np.array([[0.0, 35.0], [-8.0, 28.0], [12.0, 45.0], [5.0, 60.0]])
 LENS = np.array([-0.12, 0.03, 0.001, -0.0008, 0.0])
@@ -148,13 +150,45 @@ def test_the_covariance_is_the_boxes_share_and_the_maps() -> None:
     assert (without.map_factor_m == 0).all()
 
 
+@pytest.mark.parametrize(("anchor", "up_px", "vertical_edges"), [("bottom_centre", 0.0, 1), ("box_centre", 25.0, 2)])
+def test_an_anchor_between_two_edges_has_half_the_variance_of_one(
+    anchor: Anchor, up_px: float, vertical_edges: int
+) -> None:
+    boxes = standing(seen_px(GROUND_M), width_px=40.0, height_px=50.0)
+    found = Locator(LocateParams(anchor=anchor)).update(0.0, tracks_of(boxes), ground_map()).covariance_m2
+    points_px = seen_px(GROUND_M) - np.array([0.0, up_px])
+    jacobian = homography.point_jacobian(ground_map().image_to_ground, points_px)
+    variance_px2 = np.array([(0.06 * 40.0) ** 2 / 2.0, (0.06 * 50.0) ** 2 / vertical_edges])
+    expected = np.einsum("nij,j,nkj->nik", jacobian, variance_px2, jacobian)
+    np.testing.assert_allclose(found, expected, rtol=GEOMETRY_REL, atol=GEOMETRY_REL)
+
+
+def test_a_small_box_is_no_surer_than_a_pixel() -> None:
+    boxes = standing(seen_px(GROUND_M), width_px=4.0, height_px=10.0)
+    smaller = standing(seen_px(GROUND_M), width_px=2.0, height_px=5.0)
+    first, second = (Locator().update(0.0, tracks_of(b), ground_map()).covariance_m2 for b in (boxes, smaller))
+    np.testing.assert_array_equal(first, second)
+
+
+def test_each_map_has_its_own_share() -> None:
+    tracks = tracks_of(standing(seen_px(GROUND_M)))
+    covariance = np.diag(np.full(9, 1e-14))
+    locator = Locator()
+    once, doubled = (
+        locator.update(0.1 * i, tracks, ground_map(covariance=covariance * scale)).map_factor_m
+        for i, scale in enumerate((1.0, 4.0))
+    )
+    np.testing.assert_allclose(doubled, 2.0 * once, rtol=GEOMETRY_REL)
+    assert np.abs(once).max() > 0
+
+
 def test_coasting_makes_a_position_less_sure_with_time() -> None:
     boxes = standing(seen_px(GROUND_M[:1]))
-    locator = Locator()
-    seen = locator.update(0.0, tracks_of(boxes), ground_map()).covariance_m2[0]
-    early = locator.update(0.2, tracks_of(boxes, observed=[False]), ground_map()).covariance_m2[0]
-    late = locator.update(0.4, tracks_of(boxes, observed=[False]), ground_map()).covariance_m2[0]
-    again = locator.update(0.6, tracks_of(boxes), ground_map()).covariance_m2[0]
+    locator, ground = Locator(), ground_map()
+    seen = locator.update(0.0, tracks_of(boxes), ground).covariance_m2[0]
+    early = locator.update(0.2, tracks_of(boxes, observed=[False]), ground).covariance_m2[0]
+    late = locator.update(0.4, tracks_of(boxes, observed=[False]), ground).covariance_m2[0]
+    again = locator.update(0.6, tracks_of(boxes), ground).covariance_m2[0]
     assert (np.linalg.eigvalsh(early - seen) > 0).all()
     np.testing.assert_allclose(late - seen, 4.0 * (early - seen), rtol=GEOMETRY_REL)
     np.testing.assert_array_equal(again, seen)

@@ -66,7 +66,12 @@ class FakeSite:
     """
 
     def __init__(
-        self, size_px: tuple[int, int] = (1280, 720), *, tracks: int = 5, fps: float = 25.0, camera: Camera | None = None
+        self,
+        size_px: tuple[int, int] = (1280, 720),
+        *,
+        tracks: int = 5,
+        fps: float = 25.0,
+        camera: Camera | None = None,
     ) -> None:
         self.size_px, self.fps, self.camera = size_px, fps, camera
         width, height = size_px
@@ -199,7 +204,9 @@ class FakeSite:
                 now = None
             if now == before and not (np.isnan(gap) and before):
                 continue
-            phase = "closed" if now is None else "opened" if before is None else "unknown" if np.isnan(gap) else "updated"
+            phase = (
+                "closed" if now is None else "opened" if before is None else "unknown" if np.isnan(gap) else "updated"
+            )
             severity = now or before or "unknown"
             identity, sigma = f"H{a:02d}{b:02d}", float("nan") if np.isnan(gap) else 0.28
             events.append(

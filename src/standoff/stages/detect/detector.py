@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +15,7 @@ from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import Detections, Frame, ImageArray, IntArray
 from standoff.stages.detect.class_map import map_classes
 from standoff.stages.detect.letterbox import Letterbox
-from standoff.stages.detect.model_card import INPUT_NAME, OUTPUT_NAME, ModelCard
+from standoff.stages.detect.model_card import INPUT_NAME, OUTPUT_NAME, ModelCard, file_sha256
 from standoff.stages.detect.params import DetectParams
 from standoff.stages.detect.runtime import open_session
 from standoff.stages.detect.slices import View, views
@@ -48,7 +47,7 @@ class OnnxDetector:
         self._site_class_of = map_classes(self._card.classes, self._params.class_map, path.name)
         self._columns = self._columns_by_class()
         self._thresholds = self._thresholds_by_class()
-        self._sha256 = _sha256(path)
+        self._sha256 = file_sha256(path)
 
     def _columns_by_class(self) -> dict[int, IntArray]:
         """Site class id to the output columns of its labels, counted from the first class."""
@@ -157,8 +156,3 @@ def _check_graph(session: onnxruntime.InferenceSession, card: ModelCard, name: s
             found=f"{found}",
             fix="make the file with `standoff export`",
         )
-
-
-def _sha256(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -11,9 +11,11 @@ The metadata of the file holds one text a key: `standoff_format`, and as JSON `c
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Final
 
 from standoff.core.errors import ModelError
@@ -78,7 +80,7 @@ class ModelCard:
             raise ModelError(expected=f"model format {FORMAT} in {name}", found=found, fix=_FIX)
         try:
             return cls._from_fields({key: json.loads(metadata[key]) for key in _FIELDS}, name)
-        except (KeyError, TypeError, ValueError) as error:
+        except (AttributeError, KeyError, TypeError, ValueError) as error:
             raise ModelError(
                 expected=f"readable model metadata in {name}", found=f"{type(error).__name__}: {error}", fix=_FIX
             ) from error
@@ -98,3 +100,9 @@ class ModelCard:
 
 
 _FIELDS: Final = ("classes", "anchors_px", "input_size_px", "preprocessing", "sources")
+
+
+def file_sha256(path: Path) -> str:
+    """Return the SHA-256 of a file's content, in hexadecimal."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,9 +46,8 @@ class View:
 
 
 def _starts_and_length(side_px: int, count: int, overlap: float) -> tuple[list[int], int]:
-    length_px = min(side_px, round(side_px / (count - (count - 1) * overlap)))
-    starts = np.rint(np.linspace(0, side_px - length_px, count)).astype(int)
-    return starts.tolist(), length_px
+    length_px = min(side_px, math.ceil(side_px / (count - (count - 1) * overlap)))
+    return [(side_px - length_px) * number // max(1, count - 1) for number in range(count)], length_px
 
 
 def views(frame_size_px: tuple[int, int], slices: tuple[int, int], overlap: float) -> tuple[View, ...]:

@@ -112,6 +112,15 @@ class Header:
             return self.declared_frames
         return round(self.duration_s * self.rate_fps) if self.duration_s and self.rate_fps else None
 
+    @property
+    def tells_decoding_times_only(self) -> bool:
+        """AVI has no presentation timestamps; libav makes some up, wrong ones where pictures are reordered.
+
+        The frame's decoding time differs from its presentation time by a constant, and is missing on the
+        last few frames, one tick apart.
+        """
+        return self.container == "avi"
+
     def ends_early(self, frames: int, end_s: float) -> bool:
         """Tell whether a video that ends after this many frames and seconds is shorter than declared.
 

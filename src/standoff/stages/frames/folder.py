@@ -14,7 +14,7 @@ import av
 
 from standoff.core.errors import SourceError
 from standoff.stages.frames.pictures import AvPicture
-from standoff.stages.frames.reader import TIME_ROUNDING_S, Shot
+from standoff.stages.frames.reader import TIME_ROUNDING_S, Shot, check_size
 
 _IMAGE_SUFFIXES = frozenset({".bmp", ".jpeg", ".jpg", ".png", ".tif", ".tiff", ".webp"})
 _LEFT_BY_FILE_MANAGERS = frozenset({"thumbs.db", "desktop.ini"})
@@ -111,7 +111,9 @@ class FolderReader:
         first = max(0, math.ceil((start_s - TIME_ROUNDING_S) * self.rate_fps))
         for index in range(first, len(self._paths), every):
             path = self._paths[index]
-            yield Shot(index, index / self.rate_fps, _decode(path), path.name)
+            picture = _decode(path)
+            check_size(picture, self.size_px, path.name)
+            yield Shot(index, index / self.rate_fps, picture, path.name)
 
     @property
     def description(self) -> dict[str, Any]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Any, Protocol
 
+from standoff.core.errors import FrameSizeChanged
 from standoff.core.types import Picture
 
 TIME_ROUNDING_S = 1e-6
@@ -30,6 +31,17 @@ class Shot:
     label: str
 
 
+def check_size(picture: Picture, size_px: tuple[int, int], label: str) -> None:
+    """Raise FrameSizeChanged when a picture is not `size_px` (width, height)."""
+    found_px = (picture.width_px, picture.height_px)
+    if found_px != size_px:
+        raise FrameSizeChanged(
+            expected="pictures of {}x{} as at the start".format(*size_px),
+            found="{}x{} at {}".format(*found_px, label),
+            fix="give each size as a source of its own",
+        )
+
+
 class Reader(Protocol):
     """One kind of source, opened.
 
@@ -46,7 +58,11 @@ class Reader(Protocol):
     started_at: datetime | None
 
     def shots(self, start_s: float, every: int) -> Iterator[Shot]:
-        """Yield every `every`-th picture from the first one at or after `start_s`; called once."""
+        """Yield every `every`-th picture from the first one at or after `start_s`; called once.
+
+        Raises:
+            FrameSizeChanged: A picture has another size than `size_px`.
+        """
         ...
 
     @property

@@ -1,7 +1,7 @@
 """One door to all sources: open it, iterate once, get frames.
 
 A reader knows one kind of source (`video.py`, `folder.py`); `Source` adds what all kinds share: where to
-stop, the size that may not change, the stream's name and the time of capture. A live stream is a third
+stop, the stream's name and the time of capture. A live stream is a third
 reader.
 """
 
@@ -16,7 +16,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple, Self
 
-from standoff.core.errors import FrameSizeChanged, SourceError
+from standoff.core.errors import SourceError
 from standoff.core.types import Frame, ImageArray
 from standoff.stages.frames.folder import FolderReader
 from standoff.stages.frames.pictures import ArrayPicture
@@ -125,13 +125,6 @@ class Source:
         """
         started_at = self._reader.started_at
         for shot in self._shots:
-            size_px = (shot.picture.width_px, shot.picture.height_px)
-            if size_px != self.size_px:
-                raise FrameSizeChanged(
-                    expected="pictures of {}x{} as at the start".format(*self.size_px),
-                    found="{}x{} at {} ({:.2f} s)".format(*size_px, shot.label, shot.time_s),
-                    fix="give each size as a source of its own",
-                )
             captured_at = None if started_at is None else started_at + timedelta(seconds=shot.time_s)
             yield Frame(self.stream_id, shot.index, shot.time_s, shot.picture, captured_at)
 

@@ -14,7 +14,7 @@ import av
 from standoff.core.errors import SourceError, SourceTruncated
 from standoff.stages.frames.container import Header, not_a_video, open_video
 from standoff.stages.frames.pictures import AvPicture
-from standoff.stages.frames.reader import TIME_ROUNDING_S, Shot
+from standoff.stages.frames.reader import TIME_ROUNDING_S, Shot, check_size
 
 _UNDECODABLE_IN_A_ROW = 100
 
@@ -76,6 +76,7 @@ class VideoReader:
         """Yield the frames from where the container stands; remember why reading stopped, if it failed."""
         self._reading_error = ""
         self.corrupt_frames = failures = 0
+        last_tick = -1
         try:
             for packet in self._container.demux(self._stream):
                 self._discarded += packet.is_discard
@@ -91,6 +92,8 @@ class VideoReader:
                 for frame in frames:
                     failures = 0
                     self.corrupt_frames += frame.is_corrupt
+                    if self._header.tells_decoding_times_only:
+                        frame.pts = last_tick = last_tick + 1 if frame.dts is None else frame.dts
                     yield frame
         except av.FFmpegError as error:
             self._reading_error = str(error)
@@ -99,17 +102,20 @@ class VideoReader:
         """Yield every `every`-th picture from the first one at or after `start_s`.
 
         Raises:
+            FrameSizeChanged: At the first picture of another size.
             SourceTruncated: After the last picture, when the file declares more.
             SourceError: A timestamp is missing or does not increase.
         """
         first_index: int | None = None
         last_index, last_s, frame = -1, -math.inf, self._first
         for last_index, frame in self._numbered_from(start_s):
+            picture, label = AvPicture(frame, self._rotation_deg), f"frame {last_index}"
+            check_size(picture, self.size_px, label)
             time_s = self._time_s(last_index, frame)
             if time_s <= last_s:
                 raise SourceError(
                     expected="timestamps that increase",
-                    found=f"{time_s:.3f} s after {last_s:.3f} s at frame {last_index} of {self._path.name}",
+                    found=f"{time_s:.3f} s after {last_s:.3f} s at {label} of {self._path.name}",
                     fix="rewrap the file with ffmpeg, or give its frame rate (--fps) to replace its timestamps",
                 )
             last_s = time_s
@@ -117,7 +123,7 @@ class VideoReader:
                 continue
             first_index = last_index if first_index is None else first_index
             if (last_index - first_index) % every == 0:
-                yield Shot(last_index, time_s, AvPicture(frame, self._rotation_deg), f"frame {last_index}")
+                yield Shot(last_index, time_s, picture, label)
         self._check_end(last_index, frame)
 
     def _numbered_from(self, start_s: float) -> Iterator[tuple[int, av.VideoFrame]]:
@@ -144,9 +150,12 @@ class VideoReader:
 
         A frame's index is the number of packets shown before it, counted without decoding them.
         """
-        if self._first.pts is None or self._first.interlaced_frame:  # two fields may come as two packets
+        first = self._first
+        if first.pts is None or self._header.tells_decoding_times_only:
             return None
-        start_pts = self._first.pts + math.ceil(Fraction(start_s - TIME_ROUNDING_S) / self._header.time_base_s)
+        if first.interlaced_frame:  # its two fields may come as two packets
+            return None
+        start_pts = first.pts + math.ceil(Fraction(start_s - TIME_ROUNDING_S) / self._header.time_base_s)
         counted = self._count_packets(start_pts)
         if counted is None:
             return None
@@ -156,9 +165,9 @@ class VideoReader:
         landed = next(frames, None)
         if landed is not None and landed.key_frame and landed.pts is not None and landed.pts <= start_pts:
             wanted = (frame for frame in chain([landed], frames) if frame.pts is None or frame.pts >= start_pts)
-            first = next(wanted, None)
-            if first is not None:
-                return enumerate(chain([first], wanted), start=first_index)
+            shown = next(wanted, None)
+            if shown is not None:
+                return enumerate(chain([shown], wanted), start=first_index)
         self._container.close()
         self._container, self._stream = open_video(self._path)
         self._frames = self._decoded()
@@ -168,7 +177,7 @@ class VideoReader:
     def _count_packets(self, start_pts: int) -> tuple[int, int] | None:
         """Return how many pictures are shown before `start_pts`, and the decoding time of the last key frame there.
 
-        None where packets do not carry their times.
+        None where packets do not tell when they are shown.
         """
         count, key_frame_dts = 0, None
         container, stream = open_video(self._path)
@@ -176,13 +185,14 @@ class VideoReader:
             for packet in container.demux(stream):
                 if not packet.size:
                     continue
-                if packet.dts is None or packet.pts is None:
+                if packet.pts is None:
                     return None
-                if packet.dts >= start_pts:  # whatever follows is shown even later
+                decoded_at = packet.pts if packet.dts is None else packet.dts  # Matroska's first packets have none
+                if packet.dts is not None and decoded_at >= start_pts:  # whatever follows is shown even later
                     break
                 if self._first.pts <= packet.pts < start_pts and not packet.is_discard:
                     count += 1
-                    key_frame_dts = packet.dts if packet.is_keyframe else key_frame_dts
+                    key_frame_dts = decoded_at if packet.is_keyframe else key_frame_dts
         except av.FFmpegError:
             return None
         finally:

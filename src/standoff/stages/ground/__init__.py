@@ -1,0 +1,28 @@
+"""Where a pixel becomes a metre: the map from the picture to the ground."""
+
+from standoff.stages.ground.boards import BoardView, find_corners, read_boards
+from standoff.stages.ground.calibration import CalibrationResult, calibrate, calibrate_views
+from standoff.stages.ground.camera_file import load_camera, save_camera
+from standoff.stages.ground.params import ReferenceParams
+from standoff.stages.ground.reference import ReferenceGround
+from standoff.stages.ground.shape import ReferenceShape
+from standoff.stages.ground.survey_file import load_survey
+from standoff.stages.ground.surveyed import SurveyedGround
+from standoff.stages.ground.unmapped import Unmapped
+
+__all__ = [
+    "BoardView",
+    "CalibrationResult",
+    "ReferenceGround",
+    "ReferenceParams",
+    "ReferenceShape",
+    "SurveyedGround",
+    "Unmapped",
+    "calibrate",
+    "calibrate_views",
+    "find_corners",
+    "load_camera",
+    "load_survey",
+    "read_boards",
+    "save_camera",
+]

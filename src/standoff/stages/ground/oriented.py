@@ -9,17 +9,20 @@ Tukey's biweight, away from the corners, which every lens rounds.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import combinations
 
 import cv2
 import numpy as np
 
 from standoff.core.homography import FloatArray
-from standoff.core.types import IntArray
+from standoff.core.types import IntArray, NoGroundMap
 from standoff.stages.ground.edges import Edges, Gradients
 from standoff.stages.ground.lines import fit_line_robustly
-from standoff.stages.ground.quadrilateral import join_lines
+from standoff.stages.ground.quadrilateral import NO_QUADRILATERAL, join_lines
 from standoff.stages.ground.voting import agreeing, candidate_lines
+
+RIVALS = "two outlines in the reference's box fit equally well"
 
 _NOISE_HIGH, _NOISE_LOW = 3.5, 2.0
 """Canny's thresholds in medians of the gradient; of pure noise, one pixel in 5000 passes the upper one."""
@@ -42,6 +45,9 @@ _OUTSIDE = 0.05
 _BEYOND_FROM_PX, _BEYOND_TO_PX = 2.0, 10.0
 _BARE_COST, _BEYOND_COST = 0.5, 2.0
 _MIXED_POLARITY = 0.8
+_RIVAL_SCORE, _RIVAL_APART_PX, _LOOKED_AT = 0.95, 4.0, 12
+"""A different quadrilateral with 95 % of the best one's score makes the answer a guess: none is given."""
+
 _REFIT_PX, _REFIT_TRIM_PX, _REFIT_ROUNDS, _TUKEY_ROUNDS = 2.0, 3.0, 2, 4
 _MIN_SCATTER_PX = 0.1
 
@@ -55,12 +61,15 @@ def noise_thresholds(gradients: Gradients) -> tuple[float, float]:
     return min(_NOISE_HIGH * median / largest, 0.6), min(_NOISE_LOW * median / largest, 0.24)
 
 
-def oriented_lines(edges: Edges, box_xyxy_px: FloatArray) -> FloatArray | None:
-    """Return the reference's four sides, or None if no lines in the box make a quadrilateral.
+def oriented_lines(
+    edges: Edges, box_xyxy_px: FloatArray, believable: Callable[[FloatArray], bool]
+) -> FloatArray | NoGroundMap:
+    """Return the reference's four sides, or why there are none.
 
     Args:
         edges: Of the box, located between pixels.
         box_xyxy_px: (4,) in the same pixels as the edges.
+        believable: Whether (4, 2) corners, a pixel or two off, could be the reference.
 
     Returns:
         (4, 3) a, b, c; side k on line k, counter-clockwise as seen.
@@ -69,13 +78,15 @@ def oriented_lines(edges: Edges, box_xyxy_px: FloatArray) -> FloatArray | None:
     points, direction = edges.points_px - centre, edges.direction
     candidates = candidate_lines(points, direction, _CANDIDATES)
     if len(candidates) < 4:
-        return None
-    chosen = _best_four(candidates, _covered_before(candidates, points, direction, size), size)
-    if chosen is None:
-        return None
+        return NoGroundMap(NO_QUADRILATERAL)
+    chosen = _best_four(
+        candidates, _covered_before(candidates, points, direction, size), size, lambda at: believable(at + centre)
+    )
+    if isinstance(chosen, NoGroundMap):
+        return chosen
     lines = _refitted(candidates[chosen], points, direction)
     if lines is None:
-        return None
+        return NoGroundMap(NO_QUADRILATERAL)
     lines[:, 2] -= lines[:, :2] @ centre
     return lines
 
@@ -106,9 +117,11 @@ def _crossings(lines: FloatArray, size: FloatArray) -> FloatArray:
     return crossings
 
 
-def _best_four(lines: FloatArray, covered_before: FloatArray, size: FloatArray) -> IntArray | None:
+def _best_four(
+    lines: FloatArray, covered_before: FloatArray, size: FloatArray, believable: Callable[[FloatArray], bool]
+) -> IntArray | NoGroundMap:
     """Return the indices of the four lines, in walking order, whose quadrilateral the edges support best."""
-    walks = _WALKS[(_WALKS < len(lines)).all(axis=1)]
+    walks = _WALKS[(len(lines) > _WALKS).all(axis=1)]
     corners = _crossings(lines, size)[np.roll(walks, 1, axis=1), walks]
     known = np.isfinite(corners).all(axis=(1, 2))
     walks, corners = walks[known], corners[known]
@@ -116,12 +129,31 @@ def _best_four(lines: FloatArray, covered_before: FloatArray, size: FloatArray) 
     before = np.roll(sides, 1, axis=1)
     turns = before[..., 0] * sides[..., 1] - before[..., 1] * sides[..., 0]
     convex = (turns > 0).all(axis=1) | (turns < 0).all(axis=1)
+    # Walked clockwise, turn around: corner order 0, 3, 2, 1 lies on sides 3, 2, 1, 0.
+    clockwise = convex & (turns > 0).all(axis=1)
+    corners[clockwise] = corners[clockwise][:, [0, 3, 2, 1]]
+    walks[clockwise] = walks[clockwise][:, [3, 2, 1, 0]]
     walks, corners = walks[convex], corners[convex]
-    if not len(walks):
-        return None
     score = _scores(lines[walks], covered_before, walks, corners, size)
-    best = int(score.argmax())
-    return walks[best] if score[best] > 0 else None
+    return _first_believable(walks, corners, score, believable)
+
+
+def _first_believable(
+    walks: IntArray, corners: FloatArray, score: FloatArray, believable: Callable[[FloatArray], bool]
+) -> IntArray | NoGroundMap:
+    """Return the best walk whose corners can be believed, unless another one is as good."""
+    ranking = [k for k in np.argsort(-score, kind="stable")[:_LOOKED_AT] if score[k] > 0]
+    best = next((k for k in ranking if believable(corners[k])), None)
+    if best is None:
+        return NoGroundMap(NO_QUADRILATERAL)
+    for rival in ranking:
+        if score[rival] < _RIVAL_SCORE * score[best] or rival == best:
+            continue
+        apart = min(np.linalg.norm(np.roll(corners[rival], k, axis=0) - corners[best], axis=1).max() for k in range(4))
+        if apart > _RIVAL_APART_PX and believable(corners[rival]):
+            return NoGroundMap(RIVALS)
+    chosen: IntArray = walks[best]
+    return chosen
 
 
 def _scores(
@@ -140,7 +172,9 @@ def _scores(
         return difference
 
     length, on_side = end - start, covered(start, end)
-    beyond = covered(start - _BEYOND_TO_PX, start - _BEYOND_FROM_PX) + covered(end + _BEYOND_FROM_PX, end + _BEYOND_TO_PX)
+    beyond = covered(start - _BEYOND_TO_PX, start - _BEYOND_FROM_PX) + covered(
+        end + _BEYOND_FROM_PX, end + _BEYOND_TO_PX
+    )
     score = (on_side - _BARE_COST * (length - on_side) - _BEYOND_COST * beyond).sum(axis=1)
     centre = corners.mean(axis=1)[:, None]
     bright_inside = (sides[..., :2] * centre).sum(axis=-1) + sides[..., 2] > 0

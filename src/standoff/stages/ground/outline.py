@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from standoff.core.camera import Camera
@@ -11,7 +13,12 @@ from standoff.stages.ground.edges import Edges, between_pixels, canny, sobel_gra
 from standoff.stages.ground.lines import ransac_contours, refit, sample_pairs
 from standoff.stages.ground.oriented import noise_thresholds, oriented_lines
 from standoff.stages.ground.params import ReferenceParams
-from standoff.stages.ground.quadrilateral import NO_QUADRILATERAL, Quadrilateral, quadrilateral_from_lines, why_implausible
+from standoff.stages.ground.quadrilateral import (
+    NO_QUADRILATERAL,
+    Quadrilateral,
+    quadrilateral_from_lines,
+    why_implausible,
+)
 
 BOX_OUTSIDE = "the reference's box lies outside the picture"
 TOO_FEW_EDGES = "too few edges in the reference's box"
@@ -25,11 +32,19 @@ class OutlineFinder:
     Args:
         params: Settings.
         camera: The lens to remove from edge points before lines are fitted, for pictures of this size.
+        believable: Whether (4, 2) corners in undistorted pixels, a pixel or two off, could be the reference;
+            only `oriented` asks, to choose between quadrilaterals.
     """
 
-    def __init__(self, params: ReferenceParams | None = None, camera: Camera | None = None) -> None:
+    def __init__(
+        self,
+        params: ReferenceParams | None = None,
+        camera: Camera | None = None,
+        believable: Callable[[FloatArray], bool] = lambda _: True,
+    ) -> None:
         self.params = params if params is not None else ReferenceParams()
         self.camera = camera
+        self._believable = believable
         self._pairs = sample_pairs(self.params.iterations, self.params.seed)
 
     def find(self, gray: ImageArray, box_xyxy_px: FloatArray) -> Quadrilateral | NoGroundMap:
@@ -73,8 +88,8 @@ class OutlineFinder:
         edges = between_pixels(canny(gradients, *noise_thresholds(gradients)), gradients).undistorted(self.camera)
         if len(edges) < _MIN_EDGES:
             return NoGroundMap(TOO_FEW_EDGES)
-        lines = oriented_lines(edges, _undistorted_box(box_xyxy_px, self.camera))
-        return NoGroundMap(NO_QUADRILATERAL) if lines is None else self._joined(lines, edges, None)
+        lines = oriented_lines(edges, _undistorted_box(box_xyxy_px, self.camera), self._believable)
+        return lines if isinstance(lines, NoGroundMap) else self._joined(lines, edges, None)
 
     def _joined(self, lines: FloatArray, edges: Edges, sigma_px: float | None) -> Quadrilateral | NoGroundMap:
         made = quadrilateral_from_lines(lines, edges.points_px, self.params.inlier_px, sigma_px)

@@ -17,14 +17,16 @@ class ReferenceParams:
         ReferenceMethod,
         Doc(
             "paper: the paper's steps exactly. paper+tls: its four lines refitted by total least squares. "
-            "oriented: edge directions, candidate lines and sub-pixel refit; fails 12 times less often on hard pictures."
+            "oriented: edge directions, candidate lines and sub-pixel refit."
         ),
     ] = "oriented"
     high_threshold: Annotated[
-        float, Interval(gt=0, le=1), Doc("Canny's upper threshold, a fraction of the box's largest gradient (paper: 0.6).")
+        float, Interval(gt=0, le=1), Doc("Canny's upper threshold, a share of the box's largest gradient (paper: 0.6).")
     ] = 0.6
     low_threshold: Annotated[
-        float, Interval(gt=0, le=1), Doc("Canny's lower threshold, a fraction of the box's largest gradient (paper: 0.24).")
+        float,
+        Interval(gt=0, le=1),
+        Doc("Canny's lower threshold, another such share (paper: 0.24)."),
     ] = 0.24
     iterations: Annotated[int, Interval(ge=1, le=100_000), Doc("RANSAC hypotheses a contour (paper: 2000).")] = 2000
     inlier_px: Annotated[
@@ -48,7 +50,7 @@ class ReferenceParams:
         Doc("Each side needs edge points along at least this share of its length; less is taken as a chance line."),
     ] = 0.35
     corner_sigma_px: Annotated[
-        float, Gt(0), Doc("Standard error of a corner coordinate in px for `paper`, which has no way to tell (measured).")
+        float, Gt(0), Doc("Standard error of a corner coordinate in px for `paper`, which cannot tell; measured.")
     ] = 0.4
     plausible_px: Annotated[
         float,
@@ -60,7 +62,7 @@ class ReferenceParams:
     ] = 0.03
     focal_widths: Annotated[
         tuple[float, float],
-        Doc("Shortest and longest focal length, in picture widths, that an unknown camera may have (wide 0.4, tele 6)."),
+        Doc("Shortest and longest focal length, in picture widths, of an unknown camera (wide 0.4, tele 6)."),
     ] = (0.4, 6.0)
     memory_s: Annotated[
         float, Gt(0), Doc("For so many seconds the last known outline tells which corner is which, and where to look.")

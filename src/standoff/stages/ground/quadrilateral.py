@@ -103,7 +103,7 @@ def quadrilateral_from_lines(
     if joined is None:
         return None
     corners, lines = joined
-    support, errors = np.zeros(4), np.full((4, 2), np.nan)
+    support, errors = np.zeros(4), np.full((4, 2), inlier_px**2)
     for side, line in enumerate(lines):
         near = points_px[np.abs(points_px @ line[:2] + line[2]) <= inlier_px]
         start, end = corners[side], corners[(side + 1) % 4]
@@ -131,7 +131,7 @@ def _end_variances(offset: FloatArray, position: FloatArray, length: float) -> F
 
 
 def _corner_covariances(lines: FloatArray, end_variances: FloatArray) -> FloatArray:
-    """Carry the sides' errors to the corners where they cross; NaN where a side had too few points."""
+    """Carry the sides' errors to the corners where they cross."""
     covariances = np.empty((4, 2, 2))
     for corner in range(4):
         to_corner = np.linalg.inv(lines[[corner - 1, corner], :2])
@@ -140,8 +140,9 @@ def _corner_covariances(lines: FloatArray, end_variances: FloatArray) -> FloatAr
     return covariances
 
 
-def why_implausible(quadrilateral: Quadrilateral, picture_corners_px: FloatArray, box_xyxy_px: FloatArray,
-                    min_support: float) -> NoGroundMap | None:
+def why_implausible(
+    quadrilateral: Quadrilateral, picture_corners_px: FloatArray, box_xyxy_px: FloatArray, min_support: float
+) -> NoGroundMap | None:
     """Return why a quadrilateral cannot be the reference in this box, or None if it can.
 
     Args:

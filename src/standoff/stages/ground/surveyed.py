@@ -16,7 +16,8 @@ from standoff.core.homography import FloatArray
 from standoff.core.types import Detections, Frame, GroundMap, NoGroundMap
 from standoff.stages.ground.survey_fit import SurveyFit, fit_survey
 
-_SUSPICIOUS_SCORE = 5.0
+# Two normal coordinates reach it once in 50,000 points.
+_SUSPICIOUS_SCORE = 3.3
 _STEPS_PER_SIDE = 16
 
 
@@ -30,10 +31,6 @@ class SurveyedGround:
     map scaled to it; of another shape, `NoGroundMap("picture size differs from the survey")`, because nobody
     knows what was cut off.
 
-    Attributes:
-        fit: Residuals and covariance.
-        description: For the record; JSON types only.
-
     Args:
         points_px: (N, 2) points as seen in the picture, N >= 4; the centre of the top-left pixel is (0, 0).
         points_m: (N, 2) their positions, x east and y north or any other right-handed axes seen from above.
@@ -43,6 +40,10 @@ class SurveyedGround:
         area_px: (V, 2) polygon as seen in the picture outside which the map is not trusted, for example where
             the ground is not flat; empty: no limit but the horizon.
         point_sigma_px: How well a point was read, one coordinate; the survey's own error belongs in it too.
+
+    Attributes:
+        fit: Residuals and covariance.
+        description: For the record; JSON types only.
 
     Raises:
         GroundError: The points do not define a map.
@@ -171,6 +172,8 @@ def _scale_m_per_px(image_to_ground: FloatArray, points_px: FloatArray) -> float
 
 def _scaled(surveyed: GroundMap, size_px: tuple[int, int]) -> GroundMap | NoGroundMap:
     """Return the map for pictures of another size; edges of the picture, not pixel centres, stay in place."""
+    if size_px == surveyed.image_size_px:
+        return surveyed
     scale = np.array(size_px) / np.array(surveyed.image_size_px)
     if abs(scale[0] / scale[1] - 1.0) > 0.01:
         return NoGroundMap("picture size differs from the survey")

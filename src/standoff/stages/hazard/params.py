@@ -1,6 +1,6 @@
 """Settings of the hazard stage."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Annotated
 
 from annotated_types import Ge
@@ -52,3 +52,10 @@ class HazardParams:
     unknown_timeout_s: Annotated[
         float, Ge(0), Doc("A hazard whose pair is no longer followed stays unknown for so many seconds, then closes.")
     ] = 3.0
+
+    def __post_init__(self) -> None:
+        for setting in fields(self):
+            value = getattr(self, setting.name)
+            # Not a bound to be left to the configuration: no gap is less than NaN, so it would switch the alarm off.
+            if not value >= 0:
+                raise ValueError(f"{setting.name} must be a number from 0, not {value}")

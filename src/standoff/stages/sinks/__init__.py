@@ -4,6 +4,7 @@ from standoff.stages.sinks.folder import OUTPUT_FILES, prepare_output
 from standoff.stages.sinks.hazards import HazardSink
 from standoff.stages.sinks.params import DrawParams, ReportParams, TableParams, VideoParams
 from standoff.stages.sinks.record import RecordSink
+from standoff.stages.sinks.report import ReportSink
 from standoff.stages.sinks.tables import FRAMES, PROXIMITY, TRACKS, Table, TableSink
 from standoff.stages.sinks.video import Composer, VideoSink
 
@@ -17,6 +18,7 @@ __all__ = [
     "HazardSink",
     "RecordSink",
     "ReportParams",
+    "ReportSink",
     "Table",
     "TableParams",
     "TableSink",

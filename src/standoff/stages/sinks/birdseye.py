@@ -5,14 +5,14 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from standoff.core.homography import FloatArray
+from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import GroundMap, ImageArray, NoGroundMap
 from standoff.stages.sinks.ground_window import GroundWindow, camera_up, rectify, seen_ground_m, window_around
 from standoff.stages.sinks.painter import Painter
-from standoff.stages.sinks.pair_lines import pair_lines
 from standoff.stages.sinks.palette import bgr
 from standoff.stages.sinks.params import DrawParams
 from standoff.stages.sinks.scene import Scene
+from standoff.stages.sinks.sketch import Sketch
 from standoff.stages.sinks.text import TextSprites
 
 _OUTSIDE_FOR_S = 2.0
@@ -40,16 +40,17 @@ class BirdsEye:
         self._window: GroundWindow | None = None
         self._all_inside_at_s = -np.inf
 
-    def draw(self, panel: ImageArray, picture: ImageArray, scene: Scene) -> None:
+    def draw(self, panel: ImageArray, picture: ImageArray, sketch: Sketch) -> None:
         """Draw one frame's panel.
 
         Args:
             panel: (height, width, 3) uint8 BGR, written to.
             picture: The frame at any size, without drawings.
-            scene: What was measured.
+            sketch: What to draw.
         """
+        scene = sketch.scene
         panel[:] = self._backdrop
-        painter = Painter(panel, self._text)
+        painter = Painter(panel, self._text, self._params.size)
         if isinstance(scene.ground, NoGroundMap):
             _write_centred(painter, panel, ("NO GROUND MAP", scene.ground.reason))
             return
@@ -61,7 +62,7 @@ class BirdsEye:
         cv2.convertScaleAbs(panel, dst=panel, alpha=_DIMMED)
         _draw_axes(painter, self._window)
         _draw_scale_bar(painter, panel, self._window)
-        self._draw_entities(painter, scene, self._window)
+        self._draw_entities(painter, sketch, self._window)
 
     def _choose_window(self, scene: Scene, ground: GroundMap) -> None:
         placed = scene.positions.xy_m[scene.positions.valid]
@@ -76,37 +77,36 @@ class BirdsEye:
             self._window = window_around(points, (width, height), camera_up(ground), margin_m=6.0)
             self._all_inside_at_s = scene.time_s
 
-    def _draw_entities(self, painter: Painter, scene: Scene, window: GroundWindow) -> None:
-        tones = scene.track_tones()
-        at = window.to_window(scene.positions.xy_m)
-        observed = scene.tracks.observed
+    def _draw_entities(self, painter: Painter, sketch: Sketch, window: GroundWindow) -> None:
+        at = window.to_window(sketch.scene.positions.xy_m)
+        placed = sketch.scene.positions.valid
+        radii_px = sketch.scene.positions.radius_m / window.m_per_px
+        observed = sketch.scene.tracks.observed
         if self._params.circles:
-            for centre, radius_m, tone, seen in zip(at, scene.positions.radius_m, tones, observed, strict=True):
-                if not np.isfinite(centre).all():
-                    continue
-                outline = centre + radius_m / window.m_per_px * _CIRCLE
-                if tone in ("danger", "warning"):
-                    painter.fill(outline, bgr(tone), 0.2)
-                painter.line(outline, bgr(tone), dashed=not seen)
-        lines = [
-            line for line in pair_lines(scene, scene.feet_px(), self._params.line_within_m)
-            if np.isfinite(at[[line.row_a, line.row_b]]).all()
-        ]
-        for line in lines:
-            painter.cased_line(at[[line.row_a, line.row_b]], bgr(line.tone), dashed=line.dashed)
-        for centre, tone, seen in zip(at, tones, observed, strict=True):
-            painter.dot(centre, bgr(tone), hollow=not seen)
+            for i in np.flatnonzero(placed):
+                outline = at[i] + radii_px[i] * _CIRCLE
+                if sketch.tones[i] in ("danger", "warning"):
+                    painter.fill(outline, bgr(sketch.tones[i]), 0.2)
+                painter.line(outline, bgr(sketch.tones[i]), dashed=not observed[i])
+        for line in reversed(sketch.lines):
+            ends = [line.row_a, line.row_b]
+            if placed[ends].all():
+                painter.cased_line(at[ends], bgr(line.tone), dashed=line.dashed)
+        for i in np.flatnonzero(placed):
+            painter.dot(at[i], bgr(sketch.tones[i]), hollow=not observed[i])
         if self._params.labels:
-            _label_dots(painter, scene, at)
+            _label_dots(painter, sketch, at, placed)
 
 
-def _label_dots(painter: Painter, scene: Scene, at_px: FloatArray) -> None:
-    for (x, y), track_id, tone in zip(at_px, scene.tracks.track_id.tolist(), scene.track_tones(), strict=True):
-        if np.isfinite(x):
-            width, height = painter.label_size_px(str(track_id))
-            gap = 6 + 2 * painter.stroke_px
-            corners = [(x + gap, y - height / 2), (x - gap - width, y - height / 2), (x - width / 2, y + gap)]
-            painter.label(str(track_id), corners, accent=bgr(tone), optional=True)
+def _label_dots(painter: Painter, sketch: Sketch, at_px: FloatArray, placed: BoolArray) -> None:
+    for i in np.flatnonzero(placed):
+        text = str(sketch.scene.tracks.track_id[i])
+        width, height = painter.label_size_px(text)
+        x, y = at_px[i]
+        gap = 6 + 2 * painter.stroke_px
+        corners = [(x + gap, y - height / 2), (x - gap - width, y - height / 2), (x - width / 2, y + gap)]
+        if painter.shows(np.array([x, y, x, y])):
+            painter.label(text, corners, accent=bgr(sketch.tones[i]), optional=True)
 
 
 def _hatched(size_px: tuple[int, int]) -> ImageArray:

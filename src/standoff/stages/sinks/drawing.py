@@ -7,11 +7,11 @@ import numpy as np
 from standoff.core.homography import FloatArray
 from standoff.core.types import GroundMap, ImageArray, NoGroundMap
 from standoff.stages.sinks.ground_shapes import GroundCircles
-from standoff.stages.sinks.pair_lines import PairLine, pair_lines
 from standoff.stages.sinks.painter import Painter
 from standoff.stages.sinks.palette import Tone, bgr
 from standoff.stages.sinks.params import DrawParams
 from standoff.stages.sinks.scene import Scene
+from standoff.stages.sinks.sketch import Sketch
 from standoff.stages.sinks.text import TextSprites
 
 _LEGEND: tuple[tuple[Tone, str], ...] = (
@@ -20,7 +20,9 @@ _LEGEND: tuple[tuple[Tone, str], ...] = (
     ("worker", "worker"),
     ("machine", "machine"),
     ("unknown", "unknown"),
+    ("light", "dashed: not seen now"),
 )
+_GRAVENESS: dict[Tone, int] = {"danger": 0, "warning": 1, "unknown": 2}
 
 
 class Overlay:
@@ -36,44 +38,37 @@ class Overlay:
         self._text = text or TextSprites()
         self._circles = GroundCircles()
 
-    def draw(self, canvas: ImageArray, scene: Scene) -> None:
+    def draw(self, canvas: ImageArray, sketch: Sketch, region_px: FloatArray | None = None) -> None:
         """Draw over a picture, in place.
 
         Args:
-            canvas: (H, W, 3) uint8 BGR, the frame at any size.
-            scene: What was measured, in full-size pixels.
+            canvas: (H, W, 3) uint8 BGR, the frame, or a region of it, at any size.
+            sketch: What to draw, in full-size pixels.
+            region_px: (4,) left, top, right, bottom edges of the region that the canvas shows, in full-size
+                pixels; the whole frame by default.
         """
-        painter = Painter(canvas, self._text)
-        to_canvas = _Scale(canvas, scene)
-        tones = scene.track_tones()
-        feet = scene.feet_px()
-        lines = pair_lines(scene, feet, self._params.line_within_m)
+        scene = sketch.scene
+        painter = Painter(canvas, self._text, self._params.size)
+        to_canvas = _ToCanvas(canvas, region_px if region_px is not None else np.array([0.0, 0.0, *scene.size_px]))
         if isinstance(scene.ground, NoGroundMap):
             _draw_banner(painter, canvas, scene.ground.reason)
         else:
             _draw_anchors(painter, to_canvas, scene.ground)
             if self._params.circles:
-                self._draw_circles(painter, to_canvas, scene, scene.ground, tones)
-        _draw_boxes(painter, to_canvas, scene, tones)
-        for line in lines:
-            ends = to_canvas(feet[[line.row_a, line.row_b]])
-            painter.cased_line(ends, bgr(line.tone), dashed=line.dashed)
-        for foot, tone, observed in zip(to_canvas(feet), tones, scene.tracks.observed, strict=True):
-            painter.dot(foot, bgr(tone), hollow=not observed)
+                self._draw_circles(painter, to_canvas, sketch, scene.ground)
+        _draw_boxes(painter, to_canvas, sketch)
+        _draw_lines(painter, to_canvas, sketch)
         _draw_status(painter, canvas, scene)
         if self._params.legend:
             _draw_legend(painter, canvas)
         if self._params.labels:
-            for line in lines:
-                _label_line(painter, to_canvas(feet[[line.row_a, line.row_b]]), line)
-            _label_boxes(painter, to_canvas, scene, tones)
+            _label_lines(painter, to_canvas, sketch)
+            _label_boxes(painter, to_canvas, sketch)
 
-    def _draw_circles(
-        self, painter: Painter, to_canvas: _Scale, scene: Scene, ground: GroundMap, tones: list[Tone]
-    ) -> None:
-        positions = scene.positions
+    def _draw_circles(self, painter: Painter, to_canvas: _ToCanvas, sketch: Sketch, ground: GroundMap) -> None:
+        positions = sketch.scene.positions
         outlines = self._circles.outlines_px(ground, positions.xy_m, positions.radius_m)
-        for runs, tone, observed in zip(outlines, tones, scene.tracks.observed, strict=True):
+        for runs, tone, observed in zip(outlines, sketch.tones, sketch.scene.tracks.observed, strict=True):
             for run in runs:
                 outline = to_canvas(run)
                 if tone in ("danger", "warning"):
@@ -81,14 +76,15 @@ class Overlay:
                 painter.line(outline, bgr(tone), dashed=not observed)
 
 
-class _Scale:
-    """Full-size picture pixels to canvas pixels, pixel centres on whole numbers in both."""
+class _ToCanvas:
+    """Full-size picture pixels to canvas pixels; pixel centres are whole numbers in both, edges lie half way."""
 
-    def __init__(self, canvas: ImageArray, scene: Scene) -> None:
-        self._factor = np.array([canvas.shape[1] / scene.size_px[0], canvas.shape[0] / scene.size_px[1]])
+    def __init__(self, canvas: ImageArray, region_px: FloatArray) -> None:
+        self._origin = region_px[:2]
+        self._factor = np.array(canvas.shape[1::-1]) / (region_px[2:] - region_px[:2])
 
     def __call__(self, points_px: FloatArray) -> FloatArray:
-        scaled: FloatArray = (np.asarray(points_px).reshape(-1, 2) + 0.5) * self._factor - 0.5
+        scaled: FloatArray = (np.asarray(points_px).reshape(-1, 2) - self._origin + 0.5) * self._factor - 0.5
         return scaled
 
 
@@ -101,7 +97,7 @@ def _draw_banner(painter: Painter, canvas: ImageArray, reason: str) -> None:
     painter.box(np.array([1, 1, width - 2, height - 2]), bgr("danger"))
 
 
-def _draw_anchors(painter: Painter, to_canvas: _Scale, ground: GroundMap) -> None:
+def _draw_anchors(painter: Painter, to_canvas: _ToCanvas, ground: GroundMap) -> None:
     if not len(ground.anchors_px):
         return
     anchors = to_canvas(ground.anchors_px)
@@ -111,35 +107,52 @@ def _draw_anchors(painter: Painter, to_canvas: _Scale, ground: GroundMap) -> Non
         painter.dot(anchor, bgr("reference"), hollow=ground.age_s > 0)
 
 
-def _draw_boxes(painter: Painter, to_canvas: _Scale, scene: Scene, tones: list[Tone]) -> None:
-    corners = to_canvas(scene.tracks.xyxy_px).reshape(-1, 4)
-    for xyxy, tone, observed in zip(corners, tones, scene.tracks.observed, strict=True):
+def _draw_boxes(painter: Painter, to_canvas: _ToCanvas, sketch: Sketch) -> None:
+    tracks = sketch.scene.tracks
+    corners = to_canvas(tracks.xyxy_px).reshape(-1, 4)
+    for xyxy, tone, observed in zip(corners, sketch.tones, tracks.observed, strict=True):
         painter.box(xyxy, bgr(tone), dashed=not observed)
 
 
-def _label_line(painter: Painter, ends_px: FloatArray, line: PairLine) -> None:
-    width, height = painter.label_size_px(line.text, bold=True)
-    along = ends_px[1] - ends_px[0]
-    spots = [ends_px[0] + share * along for share in (0.5, 0.35, 0.65)]
-    on_line = [(x - width / 2, y - height / 2) for x, y in spots]
-    beside = [(x - width / 2, y + sign * 1.2 * height - height / 2) for x, y in spots for sign in (1, -1)]
-    is_short = float(np.linalg.norm(along)) < 1.5 * width
-    corners = beside + on_line if is_short else on_line + beside
-    painter.label(line.text, corners, accent=bgr(line.tone), bold=True, optional=line.tone == "light")
+def _draw_lines(painter: Painter, to_canvas: _ToCanvas, sketch: Sketch) -> None:
+    feet = to_canvas(sketch.feet_px)
+    for line in reversed(sketch.lines):
+        painter.cased_line(feet[[line.row_a, line.row_b]], bgr(line.tone), dashed=line.dashed)
+    for foot, tone, observed in zip(feet, sketch.tones, sketch.scene.tracks.observed, strict=True):
+        painter.dot(foot, bgr(tone), hollow=not observed)
 
 
-def _label_boxes(painter: Painter, to_canvas: _Scale, scene: Scene, tones: list[Tone]) -> None:
+def _label_lines(painter: Painter, to_canvas: _ToCanvas, sketch: Sketch) -> None:
+    feet = to_canvas(sketch.feet_px)
+    for line in sketch.lines:
+        ends = feet[[line.row_a, line.row_b]]
+        if not painter.shows(np.concatenate([ends.min(axis=0), ends.max(axis=0)])):
+            continue
+        width, height = painter.label_size_px(line.text, bold=True)
+        along = ends[1] - ends[0]
+        spots = [ends[0] + share * along for share in (0.5, 0.35, 0.65)]
+        on_line = [(x - width / 2, y - height / 2) for x, y in spots]
+        beside = [(x - width / 2, y + sign * 1.2 * height - height / 2) for x, y in spots for sign in (1, -1)]
+        is_short = float(np.linalg.norm(along)) < 1.5 * width
+        corners = beside + on_line if is_short else on_line + beside
+        painter.label(line.text, corners, accent=bgr(line.tone), bold=True, optional=line.tone != "danger")
+
+
+def _label_boxes(painter: Painter, to_canvas: _ToCanvas, sketch: Sketch) -> None:
+    scene, tones = sketch.scene, sketch.tones
     corners = to_canvas(scene.tracks.xyxy_px).reshape(-1, 4)
-    graveness = {"danger": 0, "warning": 1, "unknown": 2}
     names = list(scene.names().values())
     has_map = isinstance(scene.ground, GroundMap)
-    for i in sorted(range(len(tones)), key=lambda row: graveness.get(tones[row], 3)):
+    for i in sorted(range(len(tones)), key=lambda row: _GRAVENESS.get(tones[row], len(_GRAVENESS))):
+        if not painter.shows(corners[i]):
+            continue
         unplaced = has_map and not scene.positions.valid[i]
         text = f"{names[i]}: {scene.positions.reason[i] or 'no position'}" if unplaced else names[i]
         x1, y1, x2, y2 = corners[i]
         width, height = painter.label_size_px(text)
-        places = [(x1, y1 - height - 2), (x1, y2 + 2), (x2 + 2, y1), (x1 - width - 2, y1), (x2 - width, y1 - height - 2)]
-        painter.label(text, places, accent=bgr(tones[i]), optional=tones[i] in ("worker", "machine", "reference"))
+        above, below = y1 - height - 2, y2 + 2
+        places = [(x1, above), (x1, below), (x2 + 2, y1), (x1 - width - 2, y1), (x2 - width, above)]
+        painter.label(text, places, accent=bgr(tones[i]), optional=tones[i] != "danger")
 
 
 def _draw_status(painter: Painter, canvas: ImageArray, scene: Scene) -> None:

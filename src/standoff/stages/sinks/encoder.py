@@ -103,9 +103,10 @@ def available_encoder() -> str:
 
 
 def _rewrite(fragmented: Path, whole: Path) -> None:
-    with av.open(str(fragmented)) as source, av.open(
-        str(whole), "w", format="mp4", options={"movflags": "faststart"}
-    ) as target:
+    with (
+        av.open(str(fragmented)) as source,
+        av.open(str(whole), "w", format="mp4", options={"movflags": "faststart"}) as target,
+    ):
         stream: Any = source.streams.video[0]
         copied = target.add_stream_from_template(stream)
         for packet in source.demux(stream):

@@ -44,14 +44,13 @@ class GroundWindow:
     def covers(self, points_m: FloatArray) -> BoolArray:
         """Return (N,) whether each point lies in the window."""
         points_px = self.to_window(points_m)
-        inside: BoolArray = ((points_px >= 0) & (points_px <= self.size_px)).all(axis=1)
-        return inside
+        return np.asarray(((points_px >= 0) & (points_px <= self.size_px)).all(axis=1))
 
 
 def window_around(
     points_m: FloatArray, size_px: tuple[int, int], up: FloatArray, *, margin_m: float = 2.0
 ) -> GroundWindow:
-    """Fit a window of a given size around points.
+    """Fit a window of a given size around points; height to spare shows more ground at the top.
 
     Args:
         points_m: (N, 2) ground points to be seen, N > 0, finite.
@@ -69,7 +68,8 @@ def window_around(
     m_per_px = float(((high - low) / size_px).max())
     ground_to_window = np.eye(3)
     ground_to_window[:2, :2] = turn / m_per_px
-    ground_to_window[:2, 2] = np.array(size_px) / 2.0 - (low + high) / 2.0 / m_per_px
+    centred_x = size_px[0] / 2.0 - (low[0] + high[0]) / 2.0 / m_per_px
+    ground_to_window[:2, 2] = centred_x, size_px[1] - high[1] / m_per_px
     return GroundWindow(ground_to_window, size_px, m_per_px)
 
 
@@ -80,9 +80,7 @@ def seen_ground_m(ground: GroundMap) -> FloatArray:
     pixels = ground.undistorted(np.column_stack([x.ravel(), y.ravel()]))
     if len(ground.valid_px):
         outline = ground.valid_px.astype(np.float32).reshape(-1, 1, 2)
-        inside = [
-            bool(np.isfinite(p).all()) and cv2.pointPolygonTest(outline, p.tolist(), False) >= 0 for p in pixels
-        ]
+        inside = [bool(np.isfinite(p).all()) and cv2.pointPolygonTest(outline, p.tolist(), False) >= 0 for p in pixels]
         pixels = pixels[inside]
     points_m, valid = homography.apply(ground.image_to_ground, pixels)
     coarseness = np.linalg.norm(homography.point_jacobian(ground.image_to_ground, pixels), axis=(1, 2))
@@ -125,7 +123,12 @@ def rectify(picture: ImageArray, ground: GroundMap, window: GroundWindow, onto: 
     if ground.camera is None:
         flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
         cv2.warpPerspective(
-            picture, to_picture @ window_to_image, window.size_px, dst=onto, flags=flags, borderMode=cv2.BORDER_TRANSPARENT
+            picture,
+            to_picture @ window_to_image,
+            window.size_px,
+            dst=onto,
+            flags=flags,
+            borderMode=cv2.BORDER_TRANSPARENT,
         )
     else:
         _remap_through_lens(picture, ground, window_to_image, to_picture, onto)

@@ -6,11 +6,12 @@ from collections.abc import Sequence
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from standoff.core.homography import FloatArray
 from standoff.core.types import ImageArray
 from standoff.stages.sinks.palette import Bgr, bgr
-from standoff.stages.sinks.text import TextSprites, blend
+from standoff.stages.sinks.text import TextSprites, write_light
 
 _SHIFT = 4
 _FAR_PX = 1e6
@@ -27,43 +28,35 @@ class Painter:
     Args:
         canvas: (H, W, 3) uint8 BGR, drawn on in place.
         text: Where text comes from.
-        reference_px: Height that sizes are in proportion to; the canvas's own by default.
+        size: Factor on the usual sizes of text and lines.
     """
 
-    def __init__(self, canvas: ImageArray, text: TextSprites, reference_px: int | None = None) -> None:
+    def __init__(self, canvas: ImageArray, text: TextSprites, size: float = 1.0) -> None:
         self._canvas, self._text = canvas, text
-        height = reference_px or canvas.shape[0]
-        self.stroke_px = max(1, round(height / 380))
-        self.font_px = max(11, round(height / 56))
+        height = size * canvas.shape[0]
+        self.stroke_px: int = max(1, round(height / 340))
+        self.font_px: int = max(11, round(height / 54))
         self._taken: list[Rectangle] = []
 
-    def line(
-        self, points_px: FloatArray, colour: Bgr, *, width_px: int | None = None, dashed: bool = False
-    ) -> None:
+    def shows(self, xyxy_px: FloatArray) -> bool:
+        """Return whether a part of a box lies on the canvas."""
+        height, width = self._canvas.shape[:2]
+        x1, y1, x2, y2 = xyxy_px
+        return bool(x1 < width and y1 < height and x2 > 0 and y2 > 0)
+
+    def line(self, points_px: FloatArray, colour: Bgr, *, dashed: bool = False) -> None:
         """Draw an open polyline through (N, 2) points."""
-        self._strokes(self._dashes(points_px) if dashed else [points_px], colour, width_px or self.stroke_px)
+        self._strokes(_dashes(points_px, self.stroke_px) if dashed else points_px[None], colour, self.stroke_px)
 
     def cased_line(self, points_px: FloatArray, colour: Bgr, *, dashed: bool = False) -> None:
         """Draw a polyline with a dark edge, to be seen on any ground."""
-        strokes = self._dashes(points_px) if dashed else [points_px]
+        strokes = _dashes(points_px, self.stroke_px) if dashed else points_px[None]
         self._strokes(strokes, bgr("dark"), self.stroke_px + 2)
         self._strokes(strokes, colour, self.stroke_px)
 
-    def _strokes(self, strokes: Sequence[FloatArray], colour: Bgr, width_px: int) -> None:
-        fixed = [_fixed_point(stroke) for stroke in strokes if len(stroke) > 1 and np.isfinite(stroke).all()]
-        cv2.polylines(self._canvas, fixed, False, colour, width_px, cv2.LINE_AA, _SHIFT)
-
-    def _dashes(self, points_px: FloatArray) -> list[FloatArray]:
-        lengths = np.linalg.norm(np.diff(points_px, axis=0), axis=1)
-        along = np.concatenate([[0.0], np.cumsum(lengths)])
-        count = along[-1] / (8.0 * self.stroke_px) if len(along) > 1 else 0.0
-        if not 1.0 <= count <= _MOST_DASHES:
-            return [points_px]
-        starts = np.arange(0.0, along[-1], along[-1] / np.ceil(count))
-        ends = np.minimum(starts + 0.55 * along[-1] / np.ceil(count), along[-1])
-        at = np.column_stack([starts, ends]).ravel()
-        on = np.column_stack([np.interp(at, along, points_px[:, k]) for k in (0, 1)])
-        return list(on.reshape(-1, 2, 2))
+    def _strokes(self, strokes_px: FloatArray, colour: Bgr, width_px: int) -> None:
+        if strokes_px.size and np.isfinite(strokes_px).all():
+            cv2.polylines(self._canvas, list(_fixed_point(strokes_px)), False, colour, width_px, cv2.LINE_AA, _SHIFT)
 
     def box(self, xyxy_px: FloatArray, colour: Bgr, *, dashed: bool = False) -> None:
         """Draw a rectangle."""
@@ -101,7 +94,7 @@ class Painter:
 
     def label_size_px(self, text: str, *, bold: bool = False) -> tuple[int, int]:
         """Return the (width, height) of a label."""
-        height, width = self._text.mask(text, self.font_px, bold=bold).shape
+        height, width = self._text.sprite(text, self.font_px, bold=bold).shape[:2]
         return width + 2 * self._pad_x, height + 2
 
     @property
@@ -127,22 +120,21 @@ class Painter:
             optional: Leave the label out when there is no free place, instead of covering another.
         """
         size = self.label_size_px(text, bold=bold)
-        places = [self._inside(corner, size) for corner in corners_px]
-        free = [place for place in places if not self._is_taken(place)]
-        if not free and optional:
+        places = (self._inside(corner, size) for corner in corners_px)
+        free = next((place for place in places if not self._is_taken(place)), None)
+        if free is None and optional:
             return
-        x0, y0, x1, y1 = (free or places)[0]
+        x0, y0, x1, y1 = free or self._inside(corners_px[0], size)
         self._taken.append((x0, y0, x1, y1))
         area = self._canvas[y0:y1, x0:x1]
         cv2.convertScaleAbs(area, dst=area, alpha=0.28, beta=14)
         if accent is not None:
             self._canvas[y0:y1, x0 : x0 + max(3, self.font_px // 4)] = accent
-        mask = self._text.mask(text, self.font_px, bold=bold)
-        blend(self._canvas, mask, x0 + self._pad_x, y0 + 1, bgr("light"))
+        write_light(self._canvas, self._text.sprite(text, self.font_px, bold=bold), x0 + self._pad_x, y0 + 1)
 
-    def title(self, text: str, corner_px: tuple[int, int], colour: Bgr = bgr("light")) -> None:
+    def title(self, text: str, corner_px: tuple[int, int]) -> None:
         """Write bold text, straight onto the picture."""
-        blend(self._canvas, self._text.mask(text, self.font_px, bold=True), *corner_px, colour)
+        write_light(self._canvas, self._text.sprite(text, self.font_px, bold=True), *corner_px)
 
     def reserve(self, rectangle: Rectangle) -> None:
         """Keep labels away from left, top, right, bottom."""
@@ -159,6 +151,20 @@ class Painter:
         return any(x0 < right and left < x1 and y0 < bottom and top < y1 for left, top, right, bottom in self._taken)
 
 
-def _fixed_point(points_px: FloatArray) -> FloatArray:
-    fixed: FloatArray = np.round(np.clip(points_px, -_FAR_PX, _FAR_PX) * (1 << _SHIFT)).astype(np.int32)
+def _dashes(points_px: FloatArray, stroke_px: int) -> FloatArray:
+    """Cut a polyline into dashes, (K, 2, 2); one that is too long to be seen as a whole is left as it is."""
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points_px, axis=0), axis=1))])
+    count = along[-1] / (8.0 * stroke_px)
+    if not 1.0 <= count <= _MOST_DASHES:
+        return points_px[None]
+    period = along[-1] / np.ceil(count)
+    starts = period * np.arange(np.ceil(count))
+    ends = starts + 0.55 * period
+    at = np.column_stack([starts, ends]).ravel()
+    return np.column_stack([np.interp(at, along, points_px[:, k]) for k in (0, 1)]).reshape(-1, 2, 2)
+
+
+def _fixed_point(points_px: FloatArray) -> npt.NDArray[np.int32]:
+    bounded = np.maximum(np.minimum(points_px, _FAR_PX), -_FAR_PX)
+    fixed: npt.NDArray[np.int32] = np.rint(bounded * (1 << _SHIFT)).astype(np.int32)
     return fixed

@@ -73,7 +73,7 @@ def pair_lines(scene: Scene, feet_px: FloatArray, within_m: float) -> list[PairL
     wanted |= _nearest_of_each_owner(rows, tracks.class_id, apart_px, ~measured & in_sight)
     keys = list(zip(pairs.track_a.tolist(), pairs.track_b.tolist(), strict=True))
     wanted |= np.array([key in scene.hazards for key in keys])
-    lines = [_line(scene, k, keys[k], rows[k]) for k in np.flatnonzero(wanted)]
+    lines = [_line(scene, k, keys[k], rows[k]) for k in np.flatnonzero(wanted).tolist()]
     return sorted(lines, key=lambda line: _RANK[line.tone])
 
 

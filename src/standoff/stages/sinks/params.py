@@ -26,6 +26,7 @@ class DrawParams:
     line_within_m: Annotated[
         float, Gt(0), Doc("Distance lines are drawn for each person's nearest pair up to this; m. Hazards always.")
     ] = 25.0
+    size: Annotated[float, Interval(ge=0.3, le=4), Doc("Factor on the usual size of text and lines.")] = 1.0
     circles: Annotated[bool, Doc("Draw the action radii, as the ellipses that they are in the picture.")] = True
     labels: Annotated[bool, Doc("Draw class names, ids and distances.")] = True
     legend: Annotated[bool, Doc("Draw what the colours mean.")] = True

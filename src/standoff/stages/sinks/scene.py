@@ -82,13 +82,17 @@ class Scene:
         )
 
     def track_tones(self) -> list[Tone]:
-        """Return the colour of each track: of its gravest hazard, else of its class."""
+        """Return the colour of each track: of its gravest hazard, else of its class; grey when it has no position."""
         gravest: dict[int, Severity] = {}
         for pair, hazard in self.hazards.items():
             for track_id in pair:
                 gravest[track_id] = worse(hazard.severity, gravest.get(track_id, "unknown"))
-        ids_and_classes = zip(self.tracks.track_id.tolist(), self.tracks.class_id.tolist(), strict=True)
-        return [gravest.get(track_id, class_tone(class_id)) for track_id, class_id in ids_and_classes]
+        tones: list[Tone] = []
+        for row, track_id in enumerate(self.tracks.track_id.tolist()):
+            measured = bool(self.positions.valid[row])
+            at_ease: Tone = class_tone(int(self.tracks.class_id[row])) if measured else "unknown"
+            tones.append(gravest.get(track_id, at_ease))
+        return tones
 
     def names(self) -> dict[int, str]:
         """Return how each track is called in pictures: its class and id.

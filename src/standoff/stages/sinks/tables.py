@@ -103,9 +103,7 @@ class TableSink:
     def __init__(self, path: Path | str, table: Table, params: TableParams | None = None) -> None:
         params = params or TableParams()
         self._rows = table.rows
-        self._parts = ParquetParts(
-            Path(path), table.schema, flush_s=params.flush_s, flush_rows=params.flush_rows
-        )
+        self._parts = ParquetParts(Path(path), table.schema, flush_s=params.flush_s, flush_rows=params.flush_rows)
 
     def write(self, result: FrameResult) -> None:
         """Add this frame's rows."""

@@ -12,6 +12,7 @@ from standoff.stages.sinks.drawing import Overlay
 from standoff.stages.sinks.encoder import VideoFile
 from standoff.stages.sinks.params import VideoParams
 from standoff.stages.sinks.scene import OpenHazards, Scene
+from standoff.stages.sinks.sketch import Sketch
 from standoff.stages.sinks.text import TextSprites
 
 
@@ -26,6 +27,7 @@ class Composer:
     def __init__(self, size_px: tuple[int, int], params: VideoParams | None = None) -> None:
         params = params or VideoParams()
         text = TextSprites()
+        self._draw = params.draw
         self._picture_size_px, panel_width_px = _layout(size_px, params)
         width, height = self._picture_size_px
         self._canvas: ImageArray = np.zeros((height, width + panel_width_px, 3), dtype=np.uint8)
@@ -48,10 +50,11 @@ class Composer:
             (height, width, 3) uint8 BGR; the same array each time.
         """
         width = self._picture_size_px[0]
+        sketch = Sketch.of(scene, self._draw)
         self._canvas[:, :width] = picture
         if self._birdseye is not None:
-            self._birdseye.draw(self._canvas[:, width:], picture, scene)
-        self._overlay.draw(self._canvas[:, :width], scene)
+            self._birdseye.draw(self._canvas[:, width:], picture, sketch)
+        self._overlay.draw(self._canvas[:, :width], sketch)
         return self._canvas
 
     @property
@@ -80,9 +83,7 @@ class VideoSink:
         frame = result.frame
         if self._composer is None or self._file is None:
             self._composer = Composer(frame.size_px, self._params)
-            self._file = VideoFile(
-                self._path, self._composer.size_px, crf=self._params.crf, preset=self._params.preset
-            )
+            self._file = VideoFile(self._path, self._composer.size_px, crf=self._params.crf, preset=self._params.preset)
             self._start_s = frame.time_s
         self._hazards.update(result.hazards)
         size_px = self._composer.picture_size_px

@@ -33,8 +33,13 @@ class TrackParams:
     min_overlap: Annotated[
         float,
         Interval(gt=0, le=1),
-        Doc("Smallest overlap (IoU of the widened boxes) of a detection with the track that it continues."),
+        Doc("Smallest overlap (IoU of the widened boxes) of a sure detection with the track that it continues."),
     ] = 0.1
+    min_overlap_unsure: Annotated[
+        float,
+        Interval(gt=0, le=1),
+        Doc("The same for an unsure detection: stricter, because most of those are clutter."),
+    ] = 0.3
     margin: Annotated[
         float,
         Interval(ge=0, le=2),
@@ -43,8 +48,8 @@ class TrackParams:
     duplicate_overlap: Annotated[
         float,
         Interval(gt=0, le=1),
-        Doc("Of two persons, or two machines of any class, whose boxes overlap this much, only the surer one counts."),
-    ] = 0.8
+        Doc("Of two boxes of different machine classes that overlap this much, only the surer one counts."),
+    ] = 0.7
     confirm_hits: Annotated[
         int,
         Ge(1),
@@ -55,6 +60,11 @@ class TrackParams:
         Ge(0),
         Doc("Seconds that a track is predicted and reported without a detection; should exceed the detector's rests."),
     ] = 1.0
+    max_unsure_s: Annotated[
+        float,
+        Ge(0),
+        Doc("Seconds that unsure detections alone carry a track on; people behind a post reappear sooner."),
+    ] = 2.0
     box_noise: Annotated[
         float,
         Gt(0),
@@ -76,8 +86,6 @@ class TrackParams:
         Doc("Standard deviation of a new track's unknown velocity, in box sizes per second."),
     ] = 1.5
 
-    max_unsure_s: float = 2.0
-    min_overlap_unsure: float = .4
     def __post_init__(self) -> None:
         if self.low_score > self.high_score:
             raise ValueError(f"low_score ({self.low_score}) must not exceed high_score ({self.high_score})")

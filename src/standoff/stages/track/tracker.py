@@ -29,14 +29,17 @@ _ROW = np.dtype(
 _ROLE = np.array([list(Role).index(site_class.role) for site_class in CLASSES])
 _REFERENCE = list(Role).index(Role.REFERENCE)
 _OTHER_CLASS = 0.7
+_TIME_ROUNDING_S = 1e-6
 
 
 class Tracker:
     """Turn detections, frame by frame, into tracks of one stream.
 
-    Sure detections are assigned to tracks first, then unsure ones to the tracks that are left and were
-    seen when the detector last looked: a half-hidden person is still a person where one was just seen
-    (ByteTrack), but clutter must not keep a lost track alive. A track is reported
+    Sure detections are assigned to tracks first, then unsure ones to the tracks that are left: a
+    half-hidden person is still a person where one was just seen (ByteTrack). Beyond ByteTrack, a track
+    leaves a sure detection alone that fits it less well than an unsure one, which keeps it from jumping
+    to a neighbour while its own person is half hidden, and unsure detections alone carry it for
+    `max_unsure_s` only, so that clutter does not keep a ghost alive. A track is reported
     once it is confirmed, coasts on its predicted box while nothing supports it, and ends when it was
     not seen for `max_coast_s` and the detector looks again without finding it. Persons continue as
     persons, machines as machines; among machines the class may flicker, and the track's class is the
@@ -122,36 +125,39 @@ class Tracker:
         self._time_s = time_s
 
     def _relevant(self, detections: Detections) -> Detections:
-        """Drop reference objects, hopeless scores, and second boxes around the same thing."""
-        role = _ROLE[detections.class_id]
-        detections = detections[(role != _REFERENCE) & (detections.score >= self._params.low_score)]
-        detections = detections[np.argsort(-detections.score, kind="stable")]
-        role = _ROLE[detections.class_id]
-        same = overlaps(detections.xyxy_px, detections.xyxy_px) >= self._params.duplicate_overlap
-        surer_twin = np.triu(same & (role[:, None] == role), k=1).any(axis=0)
-        return detections[~surer_twin] if surer_twin.any() else detections
+        """Drop reference objects, hopeless scores, and a machine's second box under another class."""
+        surest_first = np.argsort(-detections.score, kind="stable")
+        wanted = (_ROLE[detections.class_id] != _REFERENCE) & (detections.score >= self._params.low_score)
+        detections = detections[surest_first[wanted[surest_first]]]
+        class_id, role = detections.class_id, _ROLE[detections.class_id]
+        same_thing = (role[:, None] == role) & (class_id[:, None] != class_id)
+        if same_thing.any():
+            same_thing &= overlaps(detections.xyxy_px, detections.xyxy_px) >= self._params.duplicate_overlap
+            detections = detections[~np.triu(same_thing, k=1).any(axis=0)]
+        return detections
 
     def _associate(self, detections: Detections) -> BoolArray:
         """Continue tracks with detections; return which detections (N,) are left over."""
         unclaimed = np.ones(len(detections), dtype=np.bool_)
         if not len(self._rows) or not len(detections):
             return unclaimed
+        sure = detections.score >= self._params.high_score
         similarity = self._similarity(detections)
+        possible_unsure = ~sure & (similarity >= self._params.min_overlap_unsure)
+        best_unsure = np.where(possible_unsure, similarity, 0.0).max(axis=1, keepdims=True)
+        similarity[sure & (similarity < best_unsure)] = 0.0
         confirmed = self._rows["confirmed"].copy()
         waiting = np.ones(len(self._rows), dtype=np.bool_)
-        high = detections.score >= self._params.high_score
-        params = self._params
         for tracks, candidates, at_least in (
-            (confirmed, high, params.min_overlap),
-            (confirmed, ~high, params.min_overlap_unsure),
-            (~confirmed, high, params.min_overlap),
-            (~confirmed, ~high, params.min_overlap_unsure),
+            (confirmed, sure, self._params.min_overlap),
+            (confirmed, ~sure, self._params.min_overlap_unsure),
+            (~confirmed, np.ones_like(sure), self._params.min_overlap),
         ):
             rows, columns = np.flatnonzero(tracks & waiting), np.flatnonzero(candidates & unclaimed)
             if not len(rows) or not len(columns):
                 continue
             first, second = assign(similarity[np.ix_(rows, columns)], at_least)
-            self._continue(rows[first], detections[columns[second]])
+            self._continue(rows[first], detections, columns[second])
             waiting[rows[first]] = False
             unclaimed[columns[second]] = False
         return unclaimed
@@ -165,24 +171,27 @@ class Tracker:
         agreement *= _ROLE[class_id] == _ROLE[detections.class_id]
         return agreement * overlaps(widen(predicted_px, margin), widen(detections.xyxy_px, margin))
 
-    def _continue(self, which: IntArray, detections: Detections) -> None:
-        rows = self._rows
-        motion.correct(rows, which, motion.to_centre(detections.xyxy_px), self._params)
-        rows["score"][which] = detections.score
-        rows["class_votes"][which, detections.class_id] += detections.score
+    def _continue(self, which: IntArray, detections: Detections, by: IntArray) -> None:
+        """Take detections `by` (K,) into tracks `which` (K,)."""
+        rows, score = self._rows, detections.score[by]
+        motion.correct(rows, which, motion.to_centre(detections.xyxy_px[by]), self._params)
+        rows["score"][which] = score
+        rows["class_votes"][which, detections.class_id[by]] += score
         rows["hits"][which] += 1
         rows["confirmed"][which] |= rows["hits"][which] >= self._params.confirm_hits
         rows["seen_s"][which] = self._time_s
-        rows["sure_s"][which[detections.score >= self._params.high_score]] = self._time_s
+        rows["sure_s"][which[score >= self._params.high_score]] = self._time_s
 
     def _end_lost(self) -> None:
         unseen_s = self._time_s - self._rows["seen_s"]
-        patience_s = np.where(self._rows["confirmed"], self._params.max_coast_s, 0.0)
         unsure_s = self._time_s - self._rows["sure_s"]
-        self._rows = self._rows[(unseen_s <= patience_s) & (unsure_s <= self._params.max_unsure_s)]
+        patience_s = np.where(self._rows["confirmed"], self._params.max_coast_s, 0.0) + _TIME_ROUNDING_S
+        self._rows = self._rows[(unseen_s <= patience_s) & (unsure_s <= self._params.max_unsure_s + _TIME_ROUNDING_S)]
 
     def _start(self, detections: Detections) -> None:
         count = len(detections)
+        if not count:
+            return
         rows = np.zeros(count, _ROW)
         motion.start(rows, motion.to_centre(detections.xyxy_px), self._params)
         rows["track_id"] = np.arange(self._next_id, self._next_id + count)
@@ -201,7 +210,7 @@ class Tracker:
 
     def _report(self, *, rested: bool = False) -> Tracks:
         unseen_s = self._time_s - self._rows["seen_s"]
-        rows = self._rows[self._rows["confirmed"] & (unseen_s <= self._params.max_coast_s)]
+        rows = self._rows[self._rows["confirmed"] & (unseen_s <= self._params.max_coast_s + _TIME_ROUNDING_S)]
         return Tracks(
             track_id=rows["track_id"],
             xyxy_px=motion.to_edges(rows["box"]),

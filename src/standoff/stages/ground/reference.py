@@ -1,0 +1,312 @@
+"""Ground map from a reference object of known shape: the paper's rectification (section 5.1)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from standoff.core import homography
+from standoff.core.camera import Camera
+from standoff.core.classes import Role, class_ids
+from standoff.core.errors import GroundError
+from standoff.core.homography import FloatArray
+from standoff.core.types import Detections, Frame, GroundMap, ImageArray, NoGroundMap
+from standoff.stages.ground.correspondence import camera_misfit_px, turn_from_before
+from standoff.stages.ground.follow import BoxFollower, moved_box
+from standoff.stages.ground.outline import OutlineFinder
+from standoff.stages.ground.params import ReferenceParams
+from standoff.stages.ground.quadrilateral import NO_QUADRILATERAL, Quadrilateral
+from standoff.stages.ground.shape import ReferenceShape
+
+NOT_SEEN = "no detection of the reference"
+NOT_YET = "the reference's box is given for a later frame"
+LOST = "the reference is lost"
+IMPLAUSIBLE = "no camera could see the reference like this"
+AMBIGUOUS = "which corner is which cannot be told"
+
+_LATE_S = 0.5
+"""A box given for a time that the source starts after by more than this is a mistake."""
+
+_TIME_SLACK_S = 1e-3
+_FOLLOWED_MARGIN, _FOLLOWED_MARGIN_PX = 0.06, 4.0
+_LOOSE = 2.0
+"""Corners before their refinement may be twice as far off."""
+
+
+class ReferenceGround:
+    """Finds the reference object in each frame and maps the picture to metres with it.
+
+    Where to look comes from the detector's `reference` class, or from a box given for one frame; on frames without
+    a detection the last box is followed. Which corner is which is settled by what a real camera could see, by the
+    box's `first_corner_px`, and then by the frame before. For a shape that can be turned onto itself (a square)
+    corner 0 starts as the one at the picture's bottom left.
+
+    Args:
+        shape: The reference's true shape; it defines the site frame.
+        params: Settings.
+        box_xyxy_px: (4,) left, top, right, bottom of the reference in one frame; None: the detector finds it.
+        box_time_s: Presentation timestamp of that frame; None: the first frame.
+        first_corner_px: (2,) about where corner 0 of the shape is in that frame; None: no hint.
+        camera: Calibrated camera; its lens distortion is removed from edge points before lines are fitted.
+
+    Raises:
+        GroundError: The box, its time or the hint make no sense.
+    """
+
+    def __init__(
+        self,
+        shape: ReferenceShape,
+        params: ReferenceParams | None = None,
+        *,
+        box_xyxy_px: Sequence[float] | FloatArray | None = None,
+        box_time_s: float | None = None,
+        first_corner_px: Sequence[float] | FloatArray | None = None,
+        camera: Camera | None = None,
+    ) -> None:
+        self._shape = shape
+        self._params = params if params is not None else ReferenceParams()
+        self._given_box = None if box_xyxy_px is None else _checked_box(box_xyxy_px)
+        self._given_time_s = box_time_s
+        self._given_corner = None if first_corner_px is None else _checked_corner(first_corner_px, self._given_box)
+        self._given_camera = camera
+        self._camera = camera
+        self._size_px: tuple[int, int] | None = None
+        self._finder: OutlineFinder | None = None
+        self._follower = BoxFollower()
+        self._box: FloatArray | None = None
+        self._corners: FloatArray | None = None
+        self._hint = self._given_corner
+        self._known_s = -np.inf
+        self._outlined = False
+
+    @property
+    def description(self) -> dict[str, Any]:
+        """Everything that a record of the run should say about this stage."""
+        return {
+            "kind": "reference",
+            "corners_m": self._shape.corners_m.tolist(),
+            "params": asdict(self._params),
+            "box_xyxy_px": None if self._given_box is None else self._given_box.tolist(),
+            "box_time_s": self._given_time_s,
+            "first_corner_px": None if self._given_corner is None else self._given_corner.tolist(),
+            "lens_distortion_removed": self._given_camera is not None,
+        }
+
+    def update(self, frame: Frame, detections: Detections) -> GroundMap | NoGroundMap:
+        """Map one frame.
+
+        Args:
+            frame: Frames in the order of their time.
+            detections: Of this frame; empty where the detector rested.
+
+        Returns:
+            The map from undistorted pixels to metres, observed in this frame, or why there is none.
+
+        Raises:
+            GroundError: The box or the camera does not fit the pictures.
+        """
+        finder = self._finder_for(frame)
+        gray = frame.picture.gray()
+        box = self._where(frame.time_s, gray, detections)
+        if isinstance(box, NoGroundMap):
+            return box
+        self._box = box
+        self._follower.start(gray, box)
+        self._outlined = False
+        outline = finder.find(gray, box)
+        if isinstance(outline, NoGroundMap):
+            return outline
+        turn = self._turn(outline.corners_px, frame.time_s)
+        if isinstance(turn, NoGroundMap):
+            return turn
+        ground = self._map(outline, turn, frame.size_px)
+        if isinstance(ground, GroundMap):
+            self._remember(ground, np.roll(outline.corners_px, -turn, axis=0), frame.time_s, gray)
+        return ground
+
+    def _finder_for(self, frame: Frame) -> OutlineFinder:
+        if self._finder is None or self._size_px != frame.size_px:
+            width, height = frame.size_px
+            if self._given_box is not None:
+                left, top, right, bottom = self._given_box
+                if left >= width or top >= height or right <= 0 or bottom <= 0:
+                    raise _box_error(f"a box in the picture of {width}x{height}", f"{self._given_box.tolist()}")
+            if self._given_camera is not None:
+                self._camera = _camera_for(self._given_camera, width, height)
+            self._size_px = frame.size_px
+            self._finder = OutlineFinder(self._params, self._camera, self._could_be_reference)
+        return self._finder
+
+    def _where(self, time_s: float, gray: ImageArray, detections: Detections) -> FloatArray | NoGroundMap:
+        detected = self._detected_box(time_s, detections) if self._given_box is None else None
+        if self._box is None:
+            if self._given_box is not None:
+                return self._given_box_at(time_s)
+            return detected if detected is not None else NoGroundMap(NOT_SEEN)
+        if detected is not None and self._outlined:
+            return detected
+        followed = self._followed_box(time_s, gray, self._box)
+        return detected if detected is not None else followed
+
+    def _followed_box(self, time_s: float, gray: ImageArray, box: FloatArray) -> FloatArray | NoGroundMap:
+        """Carry the box, the last known corners and the hint along with the picture."""
+        motion = self._follower.follow(gray)
+        if motion is None:
+            return NoGroundMap(LOST)
+        if self._corners is not None:
+            self._corners = self._corners @ motion[:, :2].T + motion[:, 2]
+        if self._hint is not None:
+            self._hint = motion[:, :2] @ self._hint + motion[:, 2]
+        self._known_s = time_s
+        return moved_box(motion, box)
+
+    def _given_box_at(self, time_s: float) -> FloatArray | NoGroundMap:
+        assert self._given_box is not None
+        if self._given_time_s is None:
+            return self._given_box
+        if time_s < self._given_time_s - _TIME_SLACK_S:
+            return NoGroundMap(NOT_YET)
+        if time_s > self._given_time_s + _LATE_S:
+            raise _box_error(
+                f"a frame at {self._given_time_s:g} s, for which the reference's box is given",
+                f"the first frame after it at {time_s:g} s",
+            )
+        return self._given_box
+
+    def _detected_box(self, time_s: float, detections: Detections) -> FloatArray | None:
+        """Return the surest detection; while the last box is fresh, of those near it: there may be two references."""
+        seen = detections[np.isin(detections.class_id, class_ids(Role.REFERENCE))]
+        seen = seen[seen.score >= self._params.min_score]
+        if self._box is not None and time_s - self._known_s <= self._params.memory_s:
+            centre, diagonal = _centre_and_diagonal(self._box)
+            centres = (seen.xyxy_px[:, :2] + seen.xyxy_px[:, 2:]) / 2.0
+            seen = seen[np.linalg.norm(centres - centre, axis=1) <= diagonal]
+        if not len(seen):
+            return None
+        box: FloatArray = seen.xyxy_px[int(seen.score.argmax())]
+        return box
+
+    def _misfit(self, corners_px: FloatArray) -> tuple[FloatArray, float]:
+        """Return the misfit of each cyclic order and the largest that is believed, both in px."""
+        assert self._size_px is not None
+        sides_px = np.linalg.norm(np.roll(corners_px, -1, axis=0) - corners_px, axis=1)
+        limit = max(self._params.plausible_px, self._params.plausible_share * float(sides_px.mean()))
+        misfit = camera_misfit_px(corners_px, self._shape, self._size_px, self._params.focal_widths, self._camera)
+        return misfit, limit
+
+    def _could_be_reference(self, corners_px: FloatArray) -> bool:
+        misfit, limit = self._misfit(corners_px)
+        return float(misfit.min()) <= _LOOSE * limit
+
+    def _turn(self, corners_px: FloatArray, time_s: float) -> int | NoGroundMap:
+        """Return k where corner 0 of the shape is corner k of the picture."""
+        misfit, limit = self._misfit(corners_px)
+        plausible = misfit <= limit
+        if not plausible.any():
+            return NoGroundMap(IMPLAUSIBLE)
+        told = self._told_turn(corners_px, time_s)
+        if told is not None:
+            return told if plausible[told] else NoGroundMap(IMPLAUSIBLE)
+        best = int(misfit.argmin())
+        same = [(best + turn) % 4 for turn in self._shape.turns_onto_itself()]
+        if plausible.sum() > plausible[same].sum():
+            return NoGroundMap(AMBIGUOUS)
+        if self._corners is not None:
+            stale = turn_from_before(corners_px, self._corners)
+            return stale if stale in same else best
+        return min(same, key=lambda turn: float(corners_px[turn, 0] - corners_px[turn, 1]))
+
+    def _told_turn(self, corners_px: FloatArray, time_s: float) -> int | None:
+        if self._corners is not None and time_s - self._known_s <= self._params.memory_s:
+            return turn_from_before(corners_px, self._corners)
+        if self._hint is not None:
+            hint = self._hint if self._camera is None else self._camera.undistort(self._hint)[0]
+            return int(np.linalg.norm(corners_px - hint, axis=1).argmin())
+        return None
+
+    def _map(self, outline: Quadrilateral, turn: int, size_px: tuple[int, int]) -> GroundMap | NoGroundMap:
+        corners_px = np.roll(outline.corners_px, -turn, axis=0)
+        try:
+            matrix = homography.fit(corners_px, self._shape.corners_m)
+        except np.linalg.LinAlgError:
+            return NoGroundMap(NO_QUADRILATERAL)
+        covariance_px2 = np.roll(outline.covariance_px2, -turn, axis=0)
+        return GroundMap(
+            image_to_ground=matrix,
+            covariance=homography.fit_covariance(matrix, corners_px, covariance_px2),
+            image_size_px=size_px,
+            method=f"reference:{self._params.method}",
+            scale_m_per_px=rectified_scale_m_per_px(corners_px, self._shape),
+            anchors_px=corners_px if self._camera is None else self._camera.distort(corners_px),
+            camera=self._camera,
+        )
+
+    def _remember(self, ground: GroundMap, corners_px: FloatArray, time_s: float, gray: ImageArray) -> None:
+        self._corners, self._known_s, self._hint, self._outlined = corners_px, time_s, None, True
+        low, high = ground.anchors_px.min(axis=0), ground.anchors_px.max(axis=0)
+        margin = _FOLLOWED_MARGIN * float((high - low).max()) + _FOLLOWED_MARGIN_PX
+        self._box = np.concatenate([low - margin, high + margin])
+        self._follower.start(gray, self._box)
+
+
+def rectified_scale_m_per_px(corners_px: FloatArray, shape: ReferenceShape) -> float:
+    """Return Eq. 6's reference_m / reference_px.
+
+    The paper does not say how large its rectified picture is. Here the rectified plane is the one on which the
+    reference keeps the perimeter in px that it has in the picture; for a square each side is then the mean side.
+
+    Args:
+        corners_px: (4, 2) undistorted.
+        shape: The true shape.
+
+    Source:
+        Paper, section 5.1, Eq. 6.
+
+    >>> square_px = np.array([[0.0, 0.0], [0.0, 100.0], [100.0, 100.0], [100.0, 0.0]])
+    >>> rectified_scale_m_per_px(square_px, ReferenceShape.square(2.89))
+    0.0289
+    """
+    perimeter_px = float(np.linalg.norm(np.roll(corners_px, -1, axis=0) - corners_px, axis=1).sum())
+    return float(shape.sides_m.sum()) / perimeter_px
+
+
+def _centre_and_diagonal(box_xyxy_px: FloatArray) -> tuple[FloatArray, float]:
+    return (box_xyxy_px[:2] + box_xyxy_px[2:]) / 2.0, float(np.linalg.norm(box_xyxy_px[2:] - box_xyxy_px[:2]))
+
+
+def _checked_box(box_xyxy_px: Sequence[float] | FloatArray) -> FloatArray:
+    expected = "a reference box of left, top, right, bottom in px"
+    box = np.array(box_xyxy_px, dtype=np.float64)
+    if box.shape != (4,) or not np.isfinite(box).all():
+        raise _box_error(expected, f"{box.tolist()}")
+    if box[2] <= box[0] or box[3] <= box[1]:
+        raise _box_error(expected, f"{box.tolist()}, whose right or bottom does not exceed its left or top")
+    return box
+
+
+def _checked_corner(first_corner_px: Sequence[float] | FloatArray, box: FloatArray | None) -> FloatArray:
+    corner = np.array(first_corner_px, dtype=np.float64)
+    if box is None:
+        raise _box_error("a reference box together with first_corner_px", "first_corner_px alone")
+    slack = 0.2 * (box[2:] - box[:2])
+    if corner.shape != (2,) or not ((corner >= box[:2] - slack) & (corner <= box[2:] + slack)).all():
+        raise _box_error(f"first_corner_px x, y in the reference's box {box.tolist()}", f"{corner.tolist()}")
+    return corner
+
+
+def _camera_for(camera: Camera, width: int, height: int) -> Camera:
+    try:
+        return camera.scaled_to(width, height)
+    except ValueError as error:
+        raise GroundError(
+            expected=f"a camera calibrated for pictures of {width}x{height} or the same shape",
+            found=f"one for {camera.width_px}x{camera.height_px}",
+            fix="calibrate with pictures from the same camera mode as the video",
+        ) from error
+
+
+def _box_error(expected: str, found: str) -> GroundError:
+    return GroundError(expected=expected, found=found, fix="read the box off one frame and give that frame's time")

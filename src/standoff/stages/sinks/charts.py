@@ -1,0 +1,202 @@
+"""The report's figures as inline SVG that follows the page's light or dark colours."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import cv2
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, MaxNLocator
+
+from standoff.core.homography import FloatArray
+from standoff.core.types import ImageArray
+from standoff.stages.sinks.collect import RunSummary
+from standoff.stages.sinks.ground_window import rectify, window_around
+from standoff.stages.sinks.palette import HEX, class_tone
+from standoff.stages.sinks.params import ReportParams
+from standoff.stages.sinks.series import Path, Series
+
+_INK, _MUTED, _SURFACE = "#010203", "#040506", "#070809"  # stand-ins, replaced by the page's own colours
+_FAINT_PAIRS = 20
+_PANELS = 6
+_PLAN_PX = 520
+_STYLE: dict[Any, Any] = {
+    "svg.fonttype": "none",
+    "font.family": "sans-serif",
+    "font.size": 9.0,
+    "text.color": _INK,
+    "axes.edgecolor": _MUTED,
+    "axes.labelcolor": _INK,
+    "axes.facecolor": "none",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "xtick.color": _INK,
+    "ytick.color": _INK,
+    "grid.color": _MUTED,
+    "grid.alpha": 0.3,
+    "grid.linewidth": 0.6,
+    "figure.facecolor": "none",
+    "svg.hashsalt": "standoff",
+}
+
+
+def clock(time_s: float, _position: object = None) -> str:
+    """Return minutes and seconds for an axis or a table.
+
+    >>> clock(75.25)
+    '1:15.2'
+    >>> clock(float("nan"))
+    'unknown'
+    """
+    if not np.isfinite(time_s):
+        return "unknown"
+    minutes, seconds = divmod(round(time_s, 1), 60.0)
+    return f"{int(minutes)}:{seconds:04.1f}"
+
+
+def site_chart(summary: RunSummary, params: ReportParams) -> str:
+    """Draw the closest pair's gap over time, with the limits and with what was not measured."""
+    with _figure(10.0, 3.4) as figure:
+        axes = figure.add_subplot()
+        for pair in summary.worst_pairs()[:_FAINT_PAIRS]:
+            series = summary.pairs[pair]
+            axes.plot(series.column("time_s"), series.column("gap_m"), color=_MUTED, alpha=0.45, linewidth=0.7)
+        _shade_unmeasured(axes, summary.site, summary.no_map)
+        _plot_by_limit(axes, summary.site, "gap_m", params.danger_gap_m, params.warning_gap_m)
+        axes.set_ylabel("gap of the closest pair, m")
+        highest = np.nanmax(summary.site.column("gap_m")) if summary.site.closest else 0.0
+        axes.set_ylim(top=max(1.15 * highest, params.warning_gap_m + 8.0))
+        _finish_time_axis(axes, summary)
+        return _svg(figure)
+
+
+def pair_charts(summary: RunSummary, params: ReportParams) -> str:
+    """Draw the distance of the closest pairs over time, one panel each; empty when no pair was measured."""
+    worst = summary.worst_pairs()[:_PANELS]
+    if not worst:
+        return ""
+    rows = -(-len(worst) // 2)
+    with _figure(10.0, 2.1 * rows) as figure:
+        for i, pair in enumerate(worst):
+            axes = figure.add_subplot(rows, 2, i + 1)
+            series = summary.pairs[pair]
+            time_s, distance, sigma = (series.column(name) for name in ("time_s", "distance_m", "sigma_m"))
+            both_radii_m = float(np.nanmedian(distance - series.column("gap_m")))
+            axes.fill_between(time_s, distance - sigma, distance + sigma, color=_MUTED, alpha=0.35, linewidth=0)
+            _shade_unmeasured(axes, series, series)
+            limits = both_radii_m + params.danger_gap_m, both_radii_m + params.warning_gap_m
+            _plot_by_limit(axes, series, "distance_m", *limits)
+            axes.set_title(" and ".join(summary.pair_names[pair]), loc="left", fontsize=9, fontweight="bold")
+            axes.set_ylabel("distance, m")
+            axes.set_ylim(bottom=0)
+            _finish_time_axis(axes, summary)
+        return _svg(figure)
+
+
+def plan_chart(summary: RunSummary) -> str:
+    """Draw where everything went, seen from above, x to the right; empty when nothing was placed."""
+    paths = [path for path in summary.paths.values() if np.isfinite(path.points_m).any()]
+    if not paths:
+        return ""
+    points = np.vstack([path.points_m for path in paths])
+    low, high = _square_around(points[np.isfinite(points[:, 0])])
+    with _figure(7.2, 7.2) as figure:
+        axes = figure.add_subplot()
+        background = _background(summary, low, high)
+        if background is not None:
+            axes.imshow(background, extent=(low[0], high[0], low[1], high[1]), alpha=0.55, zorder=0)
+        for path in paths:
+            _plot_path(axes, path)
+        axes.set_xlim(low[0], high[0])
+        axes.set_ylim(low[1], high[1])
+        axes.set_aspect("equal")
+        axes.set_xlabel("x, m")
+        axes.set_ylabel("y, m")
+        axes.grid(True)
+        return _svg(figure)
+
+
+@contextmanager
+def _figure(width_in: float, height_in: float) -> Iterator[Figure]:
+    with mpl.rc_context(_STYLE):
+        yield Figure(figsize=(width_in, height_in), layout="constrained")
+
+
+def _svg(figure: Figure) -> str:
+    """Return the figure as an SVG element without prolog, links or fixed size, in the page's colours."""
+    text = io.StringIO()
+    FigureCanvasSVG(figure)
+    figure.savefig(text, format="svg", metadata={"Date": None})
+    svg = re.sub(r"<metadata>.*?</metadata>", "", text.getvalue(), flags=re.DOTALL)
+    head, body = svg[svg.index("<svg") :].split(">", 1)
+    svg = re.sub(r' (width|height|xmlns:xlink)="[^"]*"', "", head) + ">" + body.replace("xlink:href", "href")
+    for stand_in, name in ((_INK, "--ink"), (_MUTED, "--muted"), (_SURFACE, "--surface")):
+        svg = svg.replace(stand_in, f"var({name})")
+    return svg
+
+
+def _shade_unmeasured(axes: Axes, unmeasured: Series, no_map: Series) -> None:
+    for start_s, end_s in unmeasured.unmeasured_spans_s():
+        axes.axvspan(start_s, end_s, facecolor=_MUTED, alpha=0.18, linewidth=0, zorder=0)
+    for start_s, end_s in no_map.unmeasured_spans_s():
+        axes.axvspan(start_s, end_s, facecolor="none", edgecolor=_MUTED, alpha=0.6, hatch="////", linewidth=0, zorder=0)
+
+
+def _plot_by_limit(axes: Axes, series: Series, column: str, danger_m: float, warning_m: float) -> None:
+    """Plot a curve in ink, in amber below the warning limit and in red below the danger limit."""
+    time_s, value = series.column("time_s"), series.column(column)
+    axes.plot(time_s, value, color=_INK, linewidth=1.4)
+    for limit_m, tone in ((warning_m, HEX["warning"]), (danger_m, HEX["danger"])):
+        axes.plot(time_s, np.where(value < limit_m, value, np.nan), color=tone, linewidth=2.0)
+        axes.axhline(limit_m, color=tone, linewidth=0.9, linestyle=(0, (5, 3)))
+
+
+def _finish_time_axis(axes: Axes, summary: RunSummary) -> None:
+    span_s = max(summary.last_s - summary.first_s, 1e-3)
+    axes.set_xlim(summary.first_s, summary.first_s + span_s)
+    axes.xaxis.set_major_formatter(FuncFormatter(clock))
+    axes.xaxis.set_major_locator(MaxNLocator(8, steps=[1, 2, 3, 6, 10]))
+    axes.grid(True, axis="y")
+
+
+def _plot_path(axes: Axes, path: Path) -> None:
+    points = path.points_m
+    placed = points[np.isfinite(points[:, 0])]
+    if not len(placed):
+        return
+    colour = HEX[class_tone(path.class_id)]
+    axes.plot(*points.T, color=_SURFACE, linewidth=3.2, alpha=0.7)
+    axes.plot(*points.T, color=colour, linewidth=1.7)
+    axes.plot(*placed[0], marker="o", markersize=5, color=_SURFACE, markeredgecolor=colour, markeredgewidth=1.6)
+    axes.plot(*placed[-1], marker="s", markersize=5.5, color=colour, markeredgecolor=_SURFACE)
+    axes.annotate(path.name, placed[-1], xytext=(6, 4), textcoords="offset points", fontsize=8)
+
+
+def _square_around(points_m: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the low and high corner of a square around nearly all points."""
+    low, high = np.percentile(points_m, [0.5, 99.5], axis=0)
+    half = 0.5 * float((high - low).max()) * 1.15 + 3.0
+    centre = (low + high) / 2.0
+    return centre - half, centre + half
+
+
+def _background(summary: RunSummary, low: FloatArray, high: FloatArray) -> ImageArray | None:
+    """Return the first mapped frame as seen from above, RGBA, clear where the camera saw nothing."""
+    if summary.background is None:
+        return None
+    picture, ground = summary.background
+    window = window_around(np.vstack([low, high]), (_PLAN_PX, _PLAN_PX), np.array([0.0, 1.0]), margin_m=0.0)
+    seen = np.zeros((_PLAN_PX, _PLAN_PX, 3), dtype=np.uint8)
+    rectify(np.full_like(picture, 255), ground, window, seen)
+    plan = np.zeros_like(seen)
+    rectify(picture, ground, window, plan)
+    rgba: ImageArray = np.dstack([cv2.cvtColor(plan, cv2.COLOR_BGR2RGB), seen[:, :, 0]]).astype(np.uint8, copy=False)
+    return rgba

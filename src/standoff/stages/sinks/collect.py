@@ -1,0 +1,201 @@
+"""What the report needs of a run, gathered frame by frame in a bounded amount of memory."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from standoff.core.types import Frame, FrameResult, GroundMap, Hazard, ImageArray, NoGroundMap, Severity
+from standoff.stages.sinks.moments import WorstMoments
+from standoff.stages.sinks.params import ReportParams
+from standoff.stages.sinks.scene import OpenHazards, Pair, Scene, worse
+from standoff.stages.sinks.series import Path, Series
+
+_MOST_HAZARDS = 5000
+_MOST_PATHS = 150
+_BACKGROUND_WIDTH_PX = 960
+
+
+@dataclass(slots=True)
+class HazardLife:
+    """One hazard from its first event to its last.
+
+    Attributes:
+        rule: "proximity" or "measurement".
+        names: What its tracks are called.
+        opened_s: Time of the first event.
+        closed_s: Time of the last; None while open.
+        severity: The gravest it had.
+        distance_m: The smallest measured; NaN when none was.
+        gap_m: Its gap.
+        sigma_m: Its standard error.
+        reason: Why it was unknown or why it closed.
+    """
+
+    rule: str
+    names: tuple[str, ...]
+    opened_s: float
+    severity: Severity
+    closed_s: float | None = None
+    distance_m: float = float("nan")
+    gap_m: float = float("nan")
+    sigma_m: float = float("nan")
+    reason: str = ""
+
+    def measure(self, distance_m: float, gap_m: float, sigma_m: float) -> None:
+        """Take a measurement; the smallest counts."""
+        if np.isfinite(distance_m) and not distance_m >= self.distance_m:
+            self.distance_m, self.gap_m, self.sigma_m = distance_m, gap_m, sigma_m
+
+
+class RunSummary:
+    """Gather counts, curves, paths, hazards and worst moments.
+
+    Args:
+        params: How much of each is kept.
+    """
+
+    def __init__(self, params: ReportParams) -> None:
+        self._most_pairs = params.pairs
+        self._open = OpenHazards()
+        self._live_tracks: set[int] = set()
+        self.counts: Counter[str] = Counter()
+        self.no_map_reasons: Counter[str] = Counter()
+        self.invalid_reasons: Counter[str] = Counter()
+        self.map_methods: Counter[str] = Counter()
+        self.moments = WorstMoments(params.moments, params.moment_width_px)
+        self.site = Series()
+        self.no_map = Series()
+        self.pairs: dict[Pair, Series] = {}
+        self.pair_names: dict[Pair, tuple[str, str]] = {}
+        self.paths: dict[int, Path] = {}
+        self.hazards: dict[str, HazardLife] = {}
+        self.first_s = self.last_s = float("nan")
+        self.stream_id = ""
+        self.size_px = (0, 0)
+        self.background: tuple[ImageArray, GroundMap] | None = None
+
+    def add(self, result: FrameResult) -> None:
+        """Take one frame."""
+        frame, pairs = result.frame, result.proximities
+        if not self.counts["frames"]:
+            self.first_s, self.stream_id, self.size_px = frame.time_s, frame.stream_id, frame.size_px
+        self.last_s = frame.time_s
+        self._open.update(result.hazards)
+        scene = Scene.of(result, self._open)
+        self._count(result)
+        self._add_ground(frame, result.ground)
+        self._add_paths(scene)
+        self._add_pairs(scene)
+        self._add_hazards(result.hazards, scene)
+        self.moments.offer(frame, scene)
+        measured = np.flatnonzero(np.isfinite(pairs.gap_m))
+        if len(measured):
+            k = measured[np.argmin(pairs.gap_m[measured])]
+            self.site.add(frame.time_s, float(pairs.gap_m[k]), float(pairs.distance_m[k]), float(pairs.sigma_m[k]))
+        else:
+            self.site.add(frame.time_s, float("nan"), float("nan"), float("nan"))
+
+    def _count(self, result: FrameResult) -> None:
+        tracks = set(result.tracks.track_id.tolist())
+        pairs = result.proximities
+        self.counts.update(
+            frames=1,
+            detected_frames=int(result.detected),
+            tracks=len(tracks - self._live_tracks),
+            distances=len(pairs),
+            measured_distances=int(np.isfinite(pairs.distance_m).sum()),
+            filtered_distances=int(pairs.filtered.sum()),
+            positions=len(result.positions),
+            valid_positions=int(result.positions.valid.sum()),
+        )
+        self.invalid_reasons.update(result.positions.reason[~result.positions.valid].tolist())
+        self._live_tracks = tracks
+
+    def _add_ground(self, frame: Frame, ground: GroundMap | NoGroundMap) -> None:
+        if isinstance(ground, NoGroundMap):
+            self.no_map_reasons[ground.reason] += 1
+            self.no_map.add(frame.time_s, float("nan"), float("nan"), float("nan"))
+            return
+        self.map_methods[ground.method] += 1
+        self.no_map.add(frame.time_s, 0.0, 0.0, 0.0)
+        if self.background is None:
+            width = min(_BACKGROUND_WIDTH_PX, frame.size_px[0])
+            height = round(width * frame.size_px[1] / frame.size_px[0])
+            self.background = (frame.picture.resized_bgr(width, height).copy(), ground)
+
+    def _add_paths(self, scene: Scene) -> None:
+        names = scene.names()
+        rows = zip(scene.tracks.track_id.tolist(), scene.tracks.class_id.tolist(), scene.positions.xy_m, strict=True)
+        for track_id, class_id, (x_m, y_m) in rows:
+            if track_id not in self.paths:
+                self.paths[track_id] = Path(names[track_id], class_id)
+            self.paths[track_id].add(float(x_m), float(y_m))
+        if len(self.paths) > 2 * _MOST_PATHS:
+            longest = sorted(self.paths, key=lambda track_id: len(self.paths[track_id]), reverse=True)
+            self.paths = {track_id: self.paths[track_id] for track_id in sorted(longest[:_MOST_PATHS])}
+
+    def _add_pairs(self, scene: Scene) -> None:
+        pairs, names = scene.proximities, scene.names()
+        keys = zip(pairs.track_a.tolist(), pairs.track_b.tolist(), strict=True)
+        numbers = zip(pairs.gap_m.tolist(), pairs.distance_m.tolist(), pairs.sigma_m.tolist(), strict=True)
+        for key, (gap_m, distance_m, sigma_m) in zip(keys, numbers, strict=True):
+            if key not in self.pairs:
+                if not self._has_room(gap_m):
+                    continue
+                self.pairs[key] = Series()
+                self.pair_names[key] = (names.get(key[0], str(key[0])), names.get(key[1], str(key[1])))
+            self.pairs[key].add(scene.time_s, gap_m, distance_m, sigma_m)
+
+    def _has_room(self, gap_m: float) -> bool:
+        """Return whether a pair is close enough to be kept, and drop the farthest one for it."""
+        if not np.isfinite(gap_m):
+            return False
+        if len(self.pairs) < self._most_pairs:
+            return True
+        farthest = self.worst_pairs()[-1]
+        closest = self.pairs[farthest].closest
+        if closest is not None and closest.gap_m <= gap_m:
+            return False
+        del self.pairs[farthest], self.pair_names[farthest]
+        return True
+
+    def worst_pairs(self) -> list[Pair]:
+        """Return the kept pairs, closest first."""
+
+        def gap_m(key: Pair) -> float:
+            closest = self.pairs[key].closest
+            return closest.gap_m if closest else float("inf")
+
+        return sorted(self.pairs, key=gap_m)
+
+    def _add_hazards(self, events: Iterable[Hazard], scene: Scene) -> None:
+        names = scene.names()
+        for event in events:
+            if event.hazard_id not in self.hazards and len(self.hazards) < _MOST_HAZARDS:
+                called = tuple(names.get(track_id, f"track {track_id}") for track_id in event.track_ids)
+                self.hazards[event.hazard_id] = HazardLife(event.rule, called, event.time_s, event.severity)
+            self.take_event(event)
+        pairs = scene.proximities
+        if not scene.hazards:
+            return
+        for k, key in enumerate(zip(pairs.track_a.tolist(), pairs.track_b.tolist(), strict=True)):
+            hazard = scene.hazards.get(key)
+            if hazard is not None and hazard.hazard_id in self.hazards:
+                numbers = float(pairs.distance_m[k]), float(pairs.gap_m[k]), float(pairs.sigma_m[k])
+                self.hazards[hazard.hazard_id].measure(*numbers)
+
+    def take_event(self, event: Hazard) -> None:
+        """Take an event of a known hazard."""
+        life = self.hazards.get(event.hazard_id)
+        if life is None:
+            self.counts["hazards_left_out"] += int(event.phase == "opened")
+            return
+        life.severity = worse(life.severity, event.severity)
+        life.measure(event.distance_m, event.gap_m, event.sigma_m)
+        life.reason = event.reason or life.reason
+        if event.phase == "closed":
+            life.closed_s = event.time_s

@@ -1,0 +1,119 @@
+"""`report.html`: one self-contained page about a run, also about one that was interrupted or failed."""
+
+from __future__ import annotations
+
+import base64
+import math
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from datetime import UTC, datetime
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import jinja2
+from markupsafe import Markup
+
+from standoff import __version__
+from standoff.core.types import FrameResult, Outcome
+from standoff.stages.sinks.charts import clock, pair_charts, plan_chart, site_chart
+from standoff.stages.sinks.collect import HazardLife, RunSummary
+from standoff.stages.sinks.folder import partial_path
+from standoff.stages.sinks.json_text import plain
+from standoff.stages.sinks.pair_lines import distance_text
+from standoff.stages.sinks.params import ReportParams
+
+_MOST_ROWS = 200
+_MOMENT_MARGIN_M = 5.0
+_RANK = {"danger": 0, "warning": 1, "unknown": 2}
+
+
+class ReportSink:
+    """Gather what the report shows while the run goes on; write it at the end.
+
+    Args:
+        path: The file, usually `report.html`.
+        params: Limits drawn, and how much is kept.
+        descriptions: What only the caller knows, by heading ("source", "model", "ground", "configuration"),
+            shown as given.
+    """
+
+    def __init__(
+        self, path: Path | str, params: ReportParams | None = None, descriptions: Mapping[str, Any] | None = None
+    ) -> None:
+        self._path, self._params = Path(path), params or ReportParams()
+        self._descriptions = dict(descriptions or {})
+        self._summary = RunSummary(self._params)
+
+    def write(self, result: FrameResult) -> None:
+        """Take one frame."""
+        self._summary.add(result)
+
+    def close(self, outcome: Outcome) -> None:
+        """Write the page; its name appears when it is whole."""
+        for event in outcome.hazards:
+            self._summary.take_event(event)
+        partial = partial_path(self._path)
+        partial.write_text(render(self._summary, outcome, self._params, self._descriptions), encoding="utf-8")
+        partial.replace(self._path)
+
+
+def render(summary: RunSummary, outcome: Outcome, params: ReportParams, descriptions: Mapping[str, Any]) -> str:
+    """Return the page."""
+    folder = files("standoff.stages.sinks")
+    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True)
+    environment.filters.update(clock=clock, percent=_percent, metres=_metres)
+    template = environment.from_string((folder / "report.html.j2").read_text(encoding="utf-8"))
+    has_frames = summary.counts["frames"] > 0
+    hazards = sorted(summary.hazards.values(), key=_gravest_first)
+    shown = summary.moments.worth_showing(params.warning_gap_m + _MOMENT_MARGIN_M)
+    return template.render(
+        version=__version__,
+        written_at=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        css=Markup((folder / "report.css").read_text(encoding="utf-8")),
+        outcome=outcome,
+        run=summary,
+        params=params,
+        unmeasured_frames=sum(summary.no_map_reasons.values()),
+        closest=summary.site.closest,
+        hazards=hazards[:_MOST_ROWS],
+        hazards_left_out=max(0, len(hazards) - _MOST_ROWS) + summary.counts["hazards_left_out"],
+        severities=Counter(hazard.severity for hazard in hazards),
+        site_chart=Markup(site_chart(summary, params)) if has_frames else "",
+        pair_charts=Markup(pair_charts(summary, params)),
+        plan_chart=Markup(plan_chart(summary)),
+        moments=[(moment, _data_uri(moment.jpeg())) for moment in shown],
+        descriptions={heading: list(_flat(plain(value))) for heading, value in descriptions.items()},
+        distance_text=distance_text,
+    )
+
+
+def _gravest_first(hazard: HazardLife) -> tuple[int, float, float]:
+    gap_m = hazard.gap_m if math.isfinite(hazard.gap_m) else math.inf
+    return _RANK[hazard.severity], gap_m, hazard.opened_s
+
+
+def _data_uri(jpeg: bytes) -> str:
+    return "data:image/jpeg;base64," + base64.b64encode(jpeg).decode("ascii")
+
+
+def _percent(share: float) -> str:
+    """Return a share for people; rounded so that only all of it is 100 %."""
+    if not math.isfinite(share):
+        return "unknown"
+    percent = 100.0 * share
+    return f"{percent:.0f} %" if percent in (0.0, 100.0) else f"{min(max(percent, 0.1), 99.9):.1f} %"
+
+
+def _metres(value_m: float) -> str:
+    return f"{value_m:.1f} m" if math.isfinite(value_m) else "unknown"
+
+
+def _flat(value: Any, prefix: str = "") -> Iterator[tuple[str, str]]:  # noqa: ANN401
+    """Yield (dotted name, text) of every leaf of nested mappings."""
+    if isinstance(value, Mapping):
+        for key, item in value.items():
+            yield from _flat(item, f"{prefix}.{key}" if prefix else str(key))
+    else:
+        text = ", ".join(map(str, value)) if isinstance(value, list) else "none" if value is None else str(value)
+        yield prefix, text

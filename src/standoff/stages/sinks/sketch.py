@@ -1,0 +1,34 @@
+"""What is drawn of a frame, decided once for all pictures that show it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from standoff.core.homography import FloatArray
+from standoff.stages.sinks.pair_lines import PairLine, pair_lines
+from standoff.stages.sinks.palette import Tone
+from standoff.stages.sinks.params import DrawParams
+from standoff.stages.sinks.scene import Scene
+
+
+@dataclass(frozen=True, slots=True)
+class Sketch:
+    """A scene with the colours and lines that it is drawn with.
+
+    Attributes:
+        scene: What was measured.
+        tones: Colour of each track.
+        feet_px: (M, 2) where each track stands, in full-size picture pixels.
+        lines: Pairs to draw, gravest first.
+    """
+
+    scene: Scene
+    tones: list[Tone]
+    feet_px: FloatArray
+    lines: list[PairLine]
+
+    @classmethod
+    def of(cls, scene: Scene, params: DrawParams) -> Sketch:
+        """Decide what to draw."""
+        feet_px = scene.feet_px()
+        return cls(scene, scene.track_tones(), feet_px, pair_lines(scene, feet_px, params.line_within_m))

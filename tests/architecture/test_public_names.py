@@ -1,0 +1,30 @@
+"""What a program may import, written down, so that a change of it is a decision and not an accident."""
+
+from __future__ import annotations
+
+import importlib
+import subprocess
+import sys
+
+import pytest
+
+PUBLIC_NAMES = {
+    "standoff.stages.frames": {"ArrayPicture", "AvPicture", "Source", "frame_from_array", "open_source"},
+    "standoff.stages.detect": {"DEFAULT_CLASS_MAP", "DetectParams", "OnnxDetector", "available_providers"},
+    "standoff.stages.track": {"TrackParams", "Tracker"},
+    "standoff.stages.locate": {"LocateParams", "Locator"},
+    "standoff.stages.proximity": {"ProximityMeter", "ProximityParams"},
+    "standoff.stages.hazard": {"HazardMonitor", "HazardParams"},
+}
+
+
+@pytest.mark.parametrize("module", PUBLIC_NAMES)
+def test_a_stage_exports_what_is_written_down(module: str) -> None:
+    assert set(importlib.import_module(module).__all__) == PUBLIC_NAMES[module]
+
+
+@pytest.mark.parametrize("heavy", ["cv2", "torch", "onnxruntime", "numba", "matplotlib", "pyarrow", "av", "scipy"])
+@pytest.mark.parametrize("light", ["standoff", "standoff.cli"])
+def test_heavy_libraries_wait_until_a_verb_needs_them(light: str, heavy: str) -> None:
+    program = f"import sys, {light}; sys.exit({heavy!r} in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0

@@ -1,0 +1,134 @@
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from stages.frames.coded_video import coded_picture, index_in
+from tolerances import RESIZED_LEVELS
+
+from standoff.core.errors import FrameSizeChanged, SourceError
+from standoff.stages.frames import open_source
+
+
+def fill(folder: Path, count: int, suffix: str = ".png") -> Path:
+    folder.mkdir(exist_ok=True)
+    for index in range(count):
+        cv2.imwrite(str(folder / f"shot{index}{suffix}"), coded_picture(index))
+    return folder
+
+
+@pytest.mark.parametrize("suffix", [".png", ".jpg", ".JPEG", ".bmp", ".tif", ".webp"])
+def test_images_come_in_natural_order_with_a_stated_rate(tmp_path: Path, suffix: str) -> None:
+    with open_source(fill(tmp_path / "site", 12, suffix), fps=4.0) as source:
+        frames = list(source)
+    assert [index_in(frame.image) for frame in frames] == list(range(12))
+    assert [frame.time_s for frame in frames] == [index / 4 for index in range(12)]
+    assert source.frame_count == 12
+    assert {(frame.stream_id, frame.captured_at) for frame in frames} == {("site", None)}
+
+
+@pytest.mark.parametrize(
+    ("start_s", "stop_s", "every", "expected"),
+    [(0.0, None, 5, [0, 5, 10]), (0.3, None, 1, list(range(3, 12))), (0.25, 0.9, 2, [3, 5, 7]), (1.1, None, 9, [11])],
+)
+def test_a_part_keeps_its_indices(
+    tmp_path: Path, start_s: float, stop_s: float | None, every: int, expected: list[int]
+) -> None:
+    with open_source(fill(tmp_path / "site", 12), fps=10, start_s=start_s, stop_s=stop_s, every=every) as source:
+        frames = list(source)
+    assert [frame.index for frame in frames] == [index_in(frame.image) for frame in frames] == expected
+    assert source.frame_count == len(expected)
+    assert source.description["kind"] == "image folder"
+    assert source.description["every"] == every
+
+
+def test_what_file_managers_leave_behind_is_overlooked(tmp_path: Path) -> None:
+    folder = fill(tmp_path / "site", 3)
+    for name in (".DS_Store", "._shot1.png", "Thumbs.db", "desktop.ini"):
+        (folder / name).write_text("not a picture")
+    assert len(list(open_source(folder, fps=1))) == 3
+
+
+def test_a_name_with_a_percent_sign_is_no_pattern(tmp_path: Path) -> None:
+    folder = fill(tmp_path / "site%d", 2)
+    (folder / "shot1.png").rename(folder / "shot%03d.png")
+    assert sorted(index_in(frame.image) for frame in open_source(folder, fps=1)) == [0, 1]
+
+
+@pytest.mark.parametrize("orientation", [1, 3, 6, 8])
+def test_orientation_in_exif_data_is_followed_as_opencv_follows_it(tmp_path: Path, orientation: int) -> None:
+    entry = struct.pack("<HHII", 0x0112, 3, 1, orientation)
+    exif = b"Exif\0\0II*\0" + struct.pack("<IH", 8, 1) + entry + struct.pack("<I", 0)
+    plain = cv2.imencode(".jpg", cv2.GaussianBlur(coded_picture(1, 130, 82), (0, 0), 5))[1].tobytes()
+    path = tmp_path / "turned.jpg"
+    path.write_bytes(plain[:2] + b"\xff\xe1" + struct.pack(">H", len(exif) + 2) + exif + plain[2:])
+    (frame,) = open_source(tmp_path, fps=1)
+    expected = cv2.imread(str(path))
+    assert expected is not None
+    assert frame.image.shape == expected.shape
+    assert np.abs(frame.image.astype(int) - expected).mean() <= RESIZED_LEVELS
+
+
+def test_photographs_of_a_drone_read_as_opencv_reads_them(shared_data: Path, tmp_path: Path) -> None:
+    path = sorted((shared_data / "drone_photos").glob("*.JPG"))[0]
+    (tmp_path / path.name).symlink_to(path)
+    (frame,) = open_source(tmp_path, fps=1)
+    expected = cv2.imread(str(path))
+    assert expected is not None
+    assert frame.image.shape == expected.shape
+    assert np.abs(frame.image.astype(int) - expected).mean() <= RESIZED_LEVELS
+
+
+# --- bad input ---
+
+
+def test_a_folder_needs_a_frame_rate(tmp_path: Path) -> None:
+    with pytest.raises(SourceError, match=r"a folder has no clock.*--fps"):
+        open_source(fill(tmp_path / "site", 2))
+
+
+def test_strangers_are_named(tmp_path: Path) -> None:
+    folder = fill(tmp_path / "site", 2)
+    for name in ("a.txt", "b.csv", "c.mp4", "d.zip"):
+        (folder / name).write_text("x")
+    with pytest.raises(SourceError, match=r"found a\.txt, b\.csv, c\.mp4 and 1 more") as caught:
+        open_source(folder, fps=1)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_folder_inside_is_a_stranger_even_if_named_like_an_image(tmp_path: Path) -> None:
+    folder = fill(tmp_path / "site", 2)
+    (folder / "more.png").mkdir()
+    with pytest.raises(SourceError, match=r"found more\.png"):
+        open_source(folder, fps=1)
+
+
+def test_an_empty_folder_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(SourceError, match="expected images in"):
+        open_source(tmp_path, fps=1)
+
+
+@pytest.mark.parametrize("suffix", [".png", ".jpg", ".bmp", ".tif", ".webp"])
+@pytest.mark.parametrize("damage", ["cut", "text", "empty"])
+def test_a_corrupt_picture_is_named(tmp_path: Path, suffix: str, damage: str) -> None:
+    folder = fill(tmp_path / "site", 3, suffix)
+    path = folder / f"shot1{suffix}"
+    content = path.read_bytes()
+    path.write_bytes({"cut": content[: len(content) // 2], "text": b"not a picture\n" * 20, "empty": b""}[damage])
+    with open_source(folder, fps=1) as source, pytest.raises(SourceError, match=f"found shot1{suffix}: "):
+        list(source)
+
+
+def test_a_picture_of_another_size_is_named(tmp_path: Path) -> None:
+    folder = fill(tmp_path / "site", 3)
+    cv2.imwrite(str(folder / "shot2.png"), coded_picture(2, 120, 80))
+    with open_source(folder, fps=1) as source, pytest.raises(FrameSizeChanged, match=r"120x80 at shot2\.png"):
+        list(source)
+
+
+def test_a_start_beyond_the_last_picture_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(SourceError, match=r"it lasts about 3\.0 s"):
+        open_source(fill(tmp_path / "site", 3), fps=1, start_s=3)

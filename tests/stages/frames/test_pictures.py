@@ -1,0 +1,130 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import av
+import cv2
+import numpy as np
+import pytest
+from av.video.reformatter import VideoReformatter
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from stages.frames.coded_video import Recipe, coded_picture, write_video
+from tolerances import GRAY_LEVELS, RESIZED_LEVELS, SWSCALE_LEVELS
+
+from standoff.core.types import ImageArray, Picture
+from standoff.stages.frames import ArrayPicture, AvPicture, frame_from_array, open_source
+
+FORMATS = ["yuv420p", "yuvj420p", "yuv422p", "yuv444p", "nv12", "gray", "rgb24", "bgr24", "yuv420p10le", "rgba"]
+LIMITED, FULL = 1, 2
+
+
+def smooth(width_px: int, height_px: int, *, seed: int = 0) -> ImageArray:
+    """Slow, unsaturated colours: chroma subsampling and gamut clipping lose next to nothing."""
+    rng = np.random.default_rng(seed)
+    gray = cv2.resize(rng.uniform(30, 220, (3, 4)).astype(np.float32), (width_px, height_px))
+    tint = cv2.resize(rng.uniform(-12, 12, (2, 2, 3)).astype(np.float32), (width_px, height_px))
+    shaded: ImageArray = np.clip(gray[..., None] + tint, 0, 255).astype(np.uint8)
+    return shaded
+
+
+def decoded(image: ImageArray, pixel_format: str, color_range: int = 0) -> av.VideoFrame:
+    frame = av.VideoFrame.from_ndarray(image, format="bgr24")
+    converted: av.VideoFrame = VideoReformatter().reformat(frame, format=pixel_format, dst_color_range=color_range)
+    return converted
+
+
+@pytest.mark.parametrize("pixel_format", FORMATS)
+@pytest.mark.parametrize("size", [(96, 64), (97, 65), (130, 82)])
+@pytest.mark.parametrize("rotation_deg", [0, 90, -90, 180])
+def test_resizing_to_the_own_size_is_the_picture_itself(
+    pixel_format: str, size: tuple[int, int], rotation_deg: int
+) -> None:
+    picture = AvPicture(decoded(smooth(*size), pixel_format), rotation_deg)
+    assert picture.bgr().shape == (picture.height_px, picture.width_px, 3)
+    assert np.array_equal(picture.resized_bgr(picture.width_px, picture.height_px), picture.bgr())
+
+
+@pytest.mark.parametrize(
+    ("pixel_format", "color_range"),
+    [(name, 0) for name in FORMATS]
+    + [(name, color_range) for name in ("yuv420p", "yuv422p", "yuv444p", "nv12") for color_range in (LIMITED, FULL)],
+)
+@pytest.mark.parametrize("size", [(96, 64), (97, 65)])
+def test_gray_is_close_to_opencvs_gray_and_upright(pixel_format: str, size: tuple[int, int], color_range: int) -> None:
+    for rotation_deg in (0, 90, 180):
+        picture = AvPicture(decoded(smooth(*size, seed=rotation_deg), pixel_format, color_range), rotation_deg)
+        expected = cv2.cvtColor(picture.bgr(), cv2.COLOR_BGR2GRAY).astype(int)
+        assert picture.gray().shape == expected.shape
+        assert np.abs(picture.gray() - expected).max() <= GRAY_LEVELS
+
+
+@pytest.mark.parametrize("color_range", [LIMITED, FULL])
+def test_black_and_white_are_0_and_255_in_either_range(tmp_path: Path, color_range: int) -> None:
+    recipe = Recipe(color_range=color_range, options={"qp": "0"})
+    (frame,) = open_source(write_video(tmp_path / "v.mp4", 1, recipe, picture=np.zeros((64, 96, 3), np.uint8)))
+    (white,) = open_source(write_video(tmp_path / "w.mp4", 1, recipe, picture=np.full((64, 96, 3), 255, np.uint8)))
+    for picture, level in ((frame.picture, 0), (white.picture, 255)):
+        assert np.abs(picture.gray().astype(int) - level).max() <= 1
+        for image in (picture.bgr(), picture.resized_bgr(48, 32)):
+            assert np.abs(image.astype(int) - level).max() <= SWSCALE_LEVELS
+
+
+@given(
+    width_px=st.integers(16, 82),  # smaller in both directions: OpenCV averages areas only then
+    height_px=st.integers(16, 60),
+    rotation_deg=st.sampled_from([0, 90, -90, 180]),
+    pixel_format=st.sampled_from(["yuv420p", "yuv444p", "bgr24", "yuv420p10le"]),
+    seed=st.integers(0, 99),
+)
+@settings(max_examples=60, deadline=None)
+def test_resizing_is_close_to_resizing_the_full_picture(
+    width_px: int, height_px: int, rotation_deg: int, pixel_format: str, seed: int
+) -> None:
+    picture = AvPicture(decoded(smooth(130, 82, seed=seed), pixel_format), rotation_deg)
+    resized = picture.resized_bgr(width_px, height_px)
+    assert resized.shape == (height_px, width_px, 3)
+    expected = cv2.resize(picture.bgr(), (width_px, height_px), interpolation=cv2.INTER_AREA)
+    assert np.abs(resized.astype(int) - expected).mean() <= RESIZED_LEVELS
+
+
+def test_shrinking_does_not_alias() -> None:
+    stripes = np.zeros((120, 160, 3), np.uint8)
+    stripes[:, ::2] = 255
+    for picture in (AvPicture(decoded(stripes, "yuv444p")), ArrayPicture(stripes)):
+        assert picture.resized_bgr(40, 30).std() < 1
+
+
+@pytest.mark.parametrize("kind", ["decoded", "array"])
+def test_pixels_are_converted_once_and_cannot_be_written(kind: str) -> None:
+    image = smooth(96, 64)
+    picture: Picture = ArrayPicture(image) if kind == "array" else AvPicture(decoded(image, "yuv420p"))
+    assert picture.bgr() is picture.bgr()
+    assert picture.gray() is picture.gray()
+    for pixels in (picture.bgr(), picture.gray()):
+        with pytest.raises(ValueError, match="read-only"):
+            pixels[0, 0] = 0
+
+
+def test_an_array_is_copied_and_keeps_its_place_in_time() -> None:
+    image = coded_picture(5)
+    frame = frame_from_array(image, index=5, time_s=0.5, stream_id="camera")
+    kept = image.copy()
+    image[:] = 0
+    assert np.array_equal(frame.image, kept)
+    assert (frame.stream_id, frame.index, frame.time_s, frame.size_px) == ("camera", 5, 0.5, (96, 64))
+    assert np.array_equal(frame.picture.resized_bgr(48, 32), cv2.resize(kept, (48, 32), interpolation=cv2.INTER_AREA))
+
+
+@pytest.mark.parametrize(
+    "image",
+    [np.zeros((4, 6), np.uint8), np.zeros((4, 6, 3)), np.zeros((0, 6, 3), np.uint8), np.zeros((4, 6, 4), np.uint8)],
+)
+def test_arrays_of_another_kind_are_refused(image: ImageArray) -> None:
+    with pytest.raises(ValueError, match=r"must be \(H, W, 3\) uint8 BGR"):
+        frame_from_array(image)
+
+
+def test_a_crooked_rotation_is_refused() -> None:
+    with pytest.raises(ValueError, match="rotation_deg"):
+        AvPicture(decoded(smooth(96, 64), "yuv420p"), 45)

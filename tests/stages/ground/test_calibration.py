@@ -1,0 +1,147 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from tolerances import BOARD_CORNER_PX, CALIBRATED_FOCAL_REL
+
+from standoff.core.camera import Camera
+from standoff.core.errors import GroundError, SourceError
+from standoff.core.types import ImageArray
+from standoff.stages.ground.boards import BoardView, find_corners, read_boards
+from standoff.stages.ground.calibration import calibrate, calibrate_views
+from standoff.stages.ground.camera_file import load_camera, save_camera
+
+_CAMERA = Camera(
+    800, 600, np.array([[900.0, 0, 410.0], [0, 905.0, 290.0], [0, 0, 1]]), np.array([-0.2, 0.05, 0.001, -0.001, 0.0])
+)
+_TILTS = [(0.3, 0.0), (-0.3, 0.1), (0.0, 0.4), (0.1, -0.4), (0.35, 0.3), (-0.2, -0.3)]
+
+
+def photographed(name: str, tilt_x: float, tilt_y: float, square_m: float = 0.03) -> BoardView:
+    """A 7x5 board as OpenCV projects it, its centre 0.8 m before the camera."""
+    grid = np.stack(np.meshgrid(np.arange(7.0), np.arange(5.0)), axis=-1) * square_m
+    space = np.concatenate([grid - grid.mean(axis=(0, 1)), np.zeros((5, 7, 1))], axis=-1).reshape(-1, 3)
+    turn, shift = np.array([tilt_x, tilt_y, 0.1]), np.array([0.02, -0.01, 0.8])
+    corners = cv2.projectPoints(space, turn, shift, _CAMERA.matrix, _CAMERA.distortion)[0]
+    return BoardView(name, (800, 600), corners.reshape(5, 7, 2))
+
+
+def drawn_board(columns: int, rows: int, square_px: int = 40, margin_px: int = 60) -> ImageArray:
+    """A board seen from straight above; its first inner corner is at margin + square - 1/2."""
+    squares = (np.indices((rows + 1, columns + 1)).sum(axis=0) % 2 * 255).astype(np.uint8)
+    board: ImageArray = np.kron(squares, np.ones((square_px, square_px), np.uint8))
+    return np.pad(board, margin_px, constant_values=255)
+
+
+def test_exact_corners_give_the_exact_camera() -> None:
+    views = [photographed(f"{i}.png", *tilt) for i, tilt in enumerate(_TILTS)]
+    result = calibrate_views(views, square_m=0.03)
+    np.testing.assert_allclose(result.camera.matrix, _CAMERA.matrix, rtol=CALIBRATED_FOCAL_REL)
+    points_px = np.array([[200.0, 150.0], [600.0, 450.0], [400.0, 300.0]])
+    np.testing.assert_allclose(result.camera.undistort(points_px), _CAMERA.undistort(points_px), atol=0.05)
+    assert result.rms_px < 1e-3
+    assert result.views_used == tuple(f"{i}.png" for i in range(len(_TILTS)))
+    assert result.per_view_rms_px.shape == (len(_TILTS),)
+
+
+def test_the_square_sets_no_pixel() -> None:
+    views = [photographed(f"{i}.png", *tilt) for i, tilt in enumerate(_TILTS)]
+    small, large = (calibrate_views(views, square_m=side).camera for side in (0.01, 1.0))
+    np.testing.assert_allclose(small.matrix, large.matrix, rtol=CALIBRATED_FOCAL_REL)
+
+
+def test_the_shared_photographs_give_the_shared_camera(shared_data: Path) -> None:
+    result = calibrate(shared_data / "checkerboards", (9, 6), 0.025)
+    known = load_camera(shared_data / "checkerboards" / "left_intrinsics.yml")
+    assert len(result.views_used) == 13
+    assert result.views_failed == ()
+    # The known camera explains its own corners to 0.39 px (one of its views to 1.18), so it is no better than that.
+    assert result.rms_px < 0.2
+    assert result.per_view_rms_px.max() < 0.3
+    assert result.camera.matrix[0, 0] == pytest.approx(known.matrix[0, 0], rel=0.01)
+    assert abs(result.camera.matrix[:2, 2] - known.matrix[:2, 2]).max() < 3.0
+    where_corners_are_px = np.array([[150.0, 100.0], [500.0, 100.0], [500.0, 380.0], [150.0, 380.0], [320.0, 240.0]])
+    rays = [(c.undistort(where_corners_are_px) - c.matrix[:2, 2]) / c.matrix[0, 0] for c in (known, result.camera)]
+    assert np.degrees(np.abs(rays[0] - rays[1]).max()) < 0.5
+
+
+def test_corners_of_a_drawn_board_are_found_where_they_were_drawn() -> None:
+    corners_px = find_corners(drawn_board(7, 5), (7, 5))
+    x, y = np.meshgrid(60 + 40 * np.arange(1, 8) - 0.5, 60 + 40 * np.arange(1, 6) - 0.5)
+    drawn_px = np.stack([x, y], axis=-1)
+    error_px = min(np.abs(corners_px - drawn_px).max(), np.abs(corners_px[::-1, ::-1] - drawn_px).max())
+    assert error_px < BOARD_CORNER_PX
+
+
+def test_a_picture_without_the_board_is_told_apart(tmp_path: Path) -> None:
+    cv2.imwrite(str(tmp_path / "a.png"), drawn_board(7, 5))
+    cv2.imwrite(str(tmp_path / "b.png"), np.full((300, 400), 128, np.uint8))
+    (tmp_path / "notes.txt").write_text("not a picture")
+    with_board, without = read_boards(tmp_path, (7, 5))
+    assert (with_board.name, with_board.found, with_board.image_size_px) == ("a.png", True, (440, 360))
+    assert (without.name, without.found, without.corners_px.shape) == ("b.png", False, (0, 0, 2))
+
+
+def test_failed_views_are_listed() -> None:
+    views = [photographed(f"{i}.png", *tilt) for i, tilt in enumerate(_TILTS)]
+    views.insert(2, BoardView("blurred.png", (800, 600), np.zeros((0, 0, 2))))
+    result = calibrate_views(views, square_m=0.03)
+    assert result.views_failed == ("blurred.png",)
+    assert "blurred.png" not in result.views_used
+
+
+def test_the_camera_file_can_carry_how_good_the_calibration_is(tmp_path: Path) -> None:
+    views = [photographed(f"{i}.png", *tilt) for i, tilt in enumerate(_TILTS)]
+    result = calibrate_views(views, square_m=0.03)
+    save_camera(result.camera, tmp_path / "camera.yaml", calibration=result.to_dict())
+    assert (tmp_path / "camera.yaml").read_text().count(".png") == len(_TILTS)
+    np.testing.assert_array_equal(load_camera(tmp_path / "camera.yaml").matrix, result.camera.matrix)
+
+
+def ground_error(views: list[BoardView], square_m: float = 0.03) -> str:
+    with pytest.raises(GroundError) as caught:
+        calibrate_views(views, square_m)
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+def test_views_that_do_not_determine_the_camera_are_refused_in_one_line() -> None:
+    good = [photographed(f"{i}.png", *tilt) for i, tilt in enumerate(_TILTS)]
+    missing = BoardView("missing.png", (800, 600), np.zeros((0, 0, 2)))
+    assert "found it in 2 of 3" in ground_error([*good[:2], missing])
+    assert "found it in 0 of 2" in ground_error([missing, missing])
+    other_size = BoardView("turned.png", (600, 800), good[0].corners_px)
+    assert "600x800 (turned.png)" in ground_error([*good[:3], other_size])
+    assert "positive side" in ground_error(good, square_m=0.0)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("tilt", [(0.0, 0.0), (0.3, 0.0)])
+def test_views_that_are_all_alike_are_refused(seed: int, tilt: tuple[float, float]) -> None:
+    rng, view = np.random.default_rng(seed), photographed("same.png", *tilt)
+    noisy = [BoardView("same.png", (800, 600), view.corners_px + rng.normal(0, 0.1, (5, 7, 2))) for _ in range(4)]
+    assert "tilted to different sides" in ground_error(noisy)
+
+
+def test_photographs_that_cannot_be_read_are_refused_in_one_line(tmp_path: Path) -> None:
+    with pytest.raises(SourceError, match="which is not there"):
+        calibrate(tmp_path / "missing")
+    with pytest.raises(SourceError, match="found none in"):
+        calibrate(tmp_path)
+    with pytest.raises(SourceError, match="found none"):
+        calibrate([])
+    with pytest.raises(SourceError, match="at least 3x3"):
+        calibrate(tmp_path, (2, 6))
+    (tmp_path / "broken.jpg").write_bytes(b"\xff\xd8\xff\xe0 not a picture")
+    with pytest.raises(SourceError, match=r"broken\.jpg, which cannot be decoded"):
+        calibrate(tmp_path)
+    (tmp_path / "broken.jpg").write_bytes(b"")
+    with pytest.raises(SourceError, match="cannot be decoded"):
+        calibrate(tmp_path)
+    with pytest.raises(SourceError, match="which is a file"):
+        calibrate(tmp_path / "broken.jpg")
+    with pytest.raises(SourceError, match="No such file"):
+        calibrate([tmp_path / "gone.png"])

@@ -1,0 +1,146 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import yaml
+
+from standoff.config import Settings, build_ground, build_pipeline, load_settings, resolved
+from standoff.core.errors import ConfigError, GroundError
+from standoff.core.types import Detections, Frame
+from standoff.stages.ground import ReferenceGround, Unmapped
+from standoff.stages.hazard import HazardMonitor
+
+
+class Blind:
+    """A detector that sees nothing, to stand in for a model."""
+
+    def __init__(self, patience: int = 0) -> None:
+        self.patience = patience
+
+    def detect(self, frame: Frame) -> Detections:
+        return Detections.empty()
+
+
+BLIND = {"replace": {"detect": {"factory": "test_config:Blind"}}}
+
+
+def write(folder: Path, text: str) -> Path:
+    path = folder / "site.yaml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_the_defaults_are_valid_and_survive_being_saved_and_read_again(tmp_path: Path) -> None:
+    plain = resolved(load_settings())
+    again = load_settings(write(tmp_path, yaml.safe_dump(plain)))
+    assert resolved(again) == plain
+
+
+def test_paths_in_a_settings_file_are_relative_to_the_file(tmp_path: Path) -> None:
+    (tmp_path / "deep").mkdir()
+    path = write(tmp_path / "deep", "model: net.onnx\nground: {survey: points.yaml, camera: /abs/camera.yaml}\n")
+    settings = load_settings(path)
+    assert settings.model == tmp_path / "deep" / "net.onnx"
+    assert settings.ground.survey == tmp_path / "deep" / "points.yaml"
+    assert settings.ground.camera == Path("/abs/camera.yaml")
+
+
+def test_the_command_line_wins_over_the_environment_and_that_over_the_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = write(tmp_path, "every: 2\ndetect_every: 2\ntrack: {max_coast_s: 3.0, confirm_hits: 5}\n")
+    monkeypatch.setenv("STANDOFF_DETECT_EVERY", "4")
+    monkeypatch.setenv("STANDOFF_EVERY", "4")
+    monkeypatch.setenv("STANDOFF_TRACK__MAX_COAST_S", "2.5")
+    settings = load_settings(path, {"every": 6})
+    assert (settings.every, settings.detect_every) == (6, 4)
+    assert (settings.track.max_coast_s, settings.track.confirm_hits) == (2.5, 5)
+
+
+@pytest.mark.parametrize(
+    ("text", "telling"),
+    [
+        ("evry: 2\n", "evry"),
+        ("track: {max_cost_s: 2}\n", "did you mean max_coast_s?"),
+        ("video: {draw: {circle: false}}\n", "video.draw has no setting 'circle'; did you mean circles?"),
+        ("track: {high_score: 1.5}\n", "less than or equal to 1"),
+        ("every: 0\n", "greater than or equal to 1"),
+        ("outputs: [video, film]\n", "film"),
+        ("locate: {radius_m: {digger: 3}}\n", "no class is called digger"),
+        ("ground: {reference: {}}\n", "give one of square_m"),
+        ("ground: {reference: {square_m: 1, rectangle_m: [1, 2]}}\n", "square_m, rectangle_m"),
+        ("ground: {reference: {sides_m: [1, 1, 1, 1]}}\n", "sides_m and diagonal_m go together"),
+        ("ground: {reference: {square_m: 2.89}, survey: a.yaml}\n", "either survey or reference"),
+        ("- a\n- b\n", "list"),
+        ("a: [\n", "YAML"),
+        ("replace: {detect: {factory: nonsense}}\n", "factory"),
+    ],
+)
+def test_wrong_settings_are_one_line_that_says_where_and_what(tmp_path: Path, text: str, telling: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        load_settings(write(tmp_path, text))
+    assert telling in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_settings_file_that_is_not_there_is_one_line(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="No such file"):
+        load_settings(tmp_path / "none.yaml")
+
+
+def test_without_a_model_the_error_says_how_to_get_one() -> None:
+    with pytest.raises(ConfigError, match="standoff export"):
+        build_pipeline(load_settings(), frames=())
+
+
+def test_every_stage_can_be_replaced_by_name(tmp_path: Path) -> None:
+    text = """
+    replace:
+      detect: {factory: "test_config:Blind", options: {patience: 7}}
+      hazard: {factory: "standoff.stages.hazard:HazardMonitor"}
+    """
+    pipeline = build_pipeline(load_settings(write(tmp_path, text)), frames=())
+    assert getattr(pipeline.detector, "patience", None) == 7
+    assert isinstance(pipeline.hazard, HazardMonitor)
+
+
+@pytest.mark.parametrize("factory", ["no_such_module:Thing", "test_config:NoSuchThing"])
+def test_a_replacement_that_is_not_there_is_one_line(factory: str) -> None:
+    settings = load_settings(overrides={"replace": {"detect": {"factory": factory}}})
+    with pytest.raises(ConfigError, match="to make the stage detect"):
+        build_pipeline(settings, frames=())
+
+
+def test_a_replacement_that_does_not_take_its_options_is_one_line() -> None:
+    settings = load_settings(
+        overrides={"replace": {"detect": {"factory": "test_config:Blind", "options": {"mood": 1}}}}
+    )
+    with pytest.raises(ConfigError, match="mood"):
+        build_pipeline(settings, frames=())
+
+
+@pytest.mark.parametrize(
+    "reference",
+    [
+        {"square_m": 2.89},
+        {"rectangle_m": [2.0, 3.0]},
+        {"sides_m": [3.0, 4.0, 3.0, 4.0], "diagonal_m": 5.0},
+        {"corners_m": [[0, 0], [2, 0], [2.5, 2], [0, 1.5]]},
+    ],
+)
+def test_a_reference_is_described_in_any_of_four_ways(reference: dict[str, object]) -> None:
+    settings = load_settings(overrides={"ground": {"reference": reference}})
+    assert isinstance(build_ground(settings), ReferenceGround)
+
+
+def test_a_shape_that_cannot_be_is_a_ground_error() -> None:
+    settings = load_settings(
+        overrides={"ground": {"reference": {"sides_m": [1.0, 1.0, 1.0, 1.0], "diagonal_m": 9.0}}}
+    )
+    with pytest.raises(GroundError):
+        build_ground(settings)
+
+
+def test_without_a_ground_every_frame_says_so() -> None:
+    assert isinstance(build_ground(Settings()), Unmapped)

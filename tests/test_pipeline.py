@@ -1,0 +1,143 @@
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from standoff.core.errors import SourceTruncated
+from standoff.core.types import Detections, Frame, FrameResult, GroundMap, NoGroundMap, Outcome
+from standoff.pipeline import Pipeline
+from standoff.stages.frames import frame_from_array
+from standoff.stages.ground import Unmapped
+from standoff.stages.hazard import HazardMonitor
+from standoff.stages.locate import Locator
+from standoff.stages.proximity import ProximityMeter
+from standoff.stages.track import Tracker
+
+
+class Memory:
+    """A sink that keeps everything, and can be told to fail."""
+
+    def __init__(self, *, fail_at: int | None = None) -> None:
+        self.results: list[FrameResult] = []
+        self.outcomes: list[Outcome] = []
+        self.fail_at = fail_at
+
+    def write(self, result: FrameResult) -> None:
+        if len(self.results) == self.fail_at:
+            raise OSError("no space left on device")
+        self.results.append(result)
+
+    def close(self, outcome: Outcome) -> None:
+        self.outcomes.append(outcome)
+
+
+class TwoWalkers:
+    """A detector that sees a worker and an excavator, always at the same places."""
+
+    def __init__(self) -> None:
+        self.calls = 0
+
+    def detect(self, frame: Frame) -> Detections:
+        self.calls += 1
+        return Detections(
+            np.array([[20.0, 20.0, 30.0, 50.0], [60.0, 20.0, 90.0, 50.0]]), np.array([0.9, 0.9]), np.array([0, 1])
+        )
+
+
+class MetreGround:
+    """Ten pixels are a metre, everywhere."""
+
+    def update(self, frame: Frame, detections: Detections) -> GroundMap | NoGroundMap:
+        matrix = np.diag([0.1, 0.1, 1.0])
+        return GroundMap(matrix, np.zeros((9, 9)), frame.size_px, "test", 0.1)
+
+
+def frames(count: int, *, broken_after: int | None = None) -> Iterator[Frame]:
+    for index in range(count):
+        if index == broken_after:
+            raise SourceTruncated(expected="10 frames", found=str(index), fix="copy the file again")
+        yield frame_from_array(np.zeros((100, 120, 3), np.uint8), index=index, time_s=index / 10)
+
+
+def pipeline(source: Iterator[Frame], *sinks: Memory, detect_every: int = 1, mapped: bool = True) -> Pipeline:
+    return Pipeline(
+        frames=source,
+        detector=TwoWalkers(),
+        ground=MetreGround() if mapped else Unmapped(),
+        tracker=Tracker(),
+        locator=Locator(),
+        proximity=ProximityMeter(),
+        hazard=HazardMonitor(),
+        sinks={f"sink{number}": sink for number, sink in enumerate(sinks)},
+        detect_every=detect_every,
+    )
+
+
+def test_a_pair_is_measured_in_metres_from_foot_to_foot() -> None:
+    results = list(pipeline(frames(10)).run())
+    distances = results[-1].proximities.distance_m
+    assert distances == pytest.approx([5.0])
+
+
+def test_every_frame_reaches_every_sink_with_the_time_of_each_stage() -> None:
+    memory = Memory()
+    results = list(pipeline(frames(5), memory).run())
+    assert [result.frame.index for result in memory.results] == [result.frame.index for result in results] == [*range(5)]
+    stages = {"frames", "detect", "ground", "track", "locate", "proximity", "hazard", "sinks.sink0"}
+    assert set(results[0].stage_ms) == stages
+    assert memory.outcomes[0].status == "complete"
+
+
+def test_tracks_coast_and_say_so_while_the_detector_rests() -> None:
+    monitored = pipeline(frames(9), detect_every=3)
+    results = list(monitored.run())
+    assert isinstance(monitored.detector, TwoWalkers)
+    assert monitored.detector.calls == 3
+    assert [result.detected for result in results] == [True, False, False] * 3
+    for result in results[3:]:
+        assert len(result.tracks) == 2
+        assert (result.tracks.observed == result.detected).all()
+
+
+def test_without_a_map_every_pair_is_there_and_none_is_measured() -> None:
+    results = list(pipeline(frames(10), mapped=False).run())
+    assert len(results[-1].proximities) == 1
+    assert np.isnan(results[-1].proximities.distance_m).all()
+    unknown = [event for result in results for event in result.hazards]
+    assert unknown and {event.severity for event in unknown} == {"unknown"}
+
+
+def test_a_sink_that_fails_is_left_out_and_the_others_go_on() -> None:
+    broken, healthy = Memory(fail_at=2), Memory()
+    monitored = pipeline(frames(6), broken, healthy)
+    assert len(list(monitored.run())) == 6
+    assert len(healthy.results) == 6
+    assert len(broken.results) == 2
+    assert "no space left" in healthy.outcomes[0].sink_errors["sink0"]
+    assert len(broken.outcomes) == 1
+
+
+def test_a_source_that_breaks_closes_the_sinks_as_failed_and_keeps_what_was_done() -> None:
+    memory = Memory()
+    with pytest.raises(SourceTruncated):
+        list(pipeline(frames(10, broken_after=4), memory).run())
+    assert len(memory.results) == 4
+    assert memory.outcomes[0].status == "failed"
+    assert "expected 10 frames, found 4" in memory.outcomes[0].message
+
+
+def test_stopping_early_closes_the_sinks_as_interrupted() -> None:
+    memory = Memory()
+    run = pipeline(frames(10), memory).run()
+    next(run)
+    run.close()
+    assert memory.outcomes[0].status == "interrupted"
+
+
+def test_hazards_still_open_at_the_end_are_closed_in_the_outcome() -> None:
+    memory = Memory()
+    opened = {event.hazard_id for result in pipeline(frames(30), memory).run() for event in result.hazards}
+    closed = {event.hazard_id for event in memory.outcomes[0].hazards if event.phase == "closed"}
+    assert opened and closed == opened

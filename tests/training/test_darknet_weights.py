@@ -1,0 +1,113 @@
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from standoff.core.errors import ModelError
+from standoff.training.darknet_cfg import parse_cfg
+from standoff.training.darknet_network import DarknetNetwork
+from standoff.training.darknet_weights import WeightsHeader, load_weights, save_weights
+
+CFG = """[net]
+width=8
+height=8
+[convolutional]
+filters=4
+size=3
+pad=1
+batch_normalize=1
+activation=leaky
+[convolutional]
+filters=6
+activation=linear
+[yolo]
+anchors=2,2
+classes=1
+"""
+FIRST = 4 + 4 + 4 + 4 + 4 * 3 * 3 * 3
+SECOND = 6 + 6 * 4
+
+
+def _network(seed: int = 0) -> DarknetNetwork:
+    torch.manual_seed(seed)
+    network = DarknetNetwork(parse_cfg(CFG, "a.cfg"))
+    for parameter in [*network.parameters(), *network.buffers()]:
+        if parameter.is_floating_point():
+            torch.nn.init.uniform_(parameter, 0.1, 1.0)
+    return network
+
+
+def _write(path: Path, numbers: int, *, nan_at: int | None = None) -> Path:
+    content = np.arange(numbers, dtype="<f4")
+    if nan_at is not None:
+        content[nan_at] = np.nan
+    path.write_bytes(struct.pack("<iiiq", 0, 2, 5, 0) + content.tobytes())
+    return path
+
+
+@pytest.mark.parametrize(
+    ("header", "header_bytes"), [(WeightsHeader(0, 2, 5, 2**40), 20), (WeightsHeader(0, 1, 0, 77), 16)]
+)
+def test_what_is_written_is_read_back_bit_by_bit(tmp_path: Path, header: WeightsHeader, header_bytes: int) -> None:
+    source, target = _network(0), _network(1)
+    save_weights(source, tmp_path / "a.weights", header)
+    assert (tmp_path / "a.weights").stat().st_size == header_bytes + 4 * (FIRST + SECOND)
+    assert load_weights(target, tmp_path / "a.weights") == header
+    expected = source.state_dict()
+    assert all(torch.equal(value, expected[name]) for name, value in target.state_dict().items())
+    save_weights(target, tmp_path / "b.weights", header)
+    assert (tmp_path / "a.weights").read_bytes() == (tmp_path / "b.weights").read_bytes()
+
+
+def test_numbers_lie_in_darknets_order(tmp_path: Path) -> None:
+    network = _network()
+    load_weights(network, _write(tmp_path / "a.weights", FIRST + SECOND))
+    (_, first), (_, second) = network.convolutions()
+    normalization = first.normalization
+    assert normalization is not None
+    assert normalization.running_mean is not None
+    assert normalization.bias.tolist() == [0, 1, 2, 3]
+    assert normalization.weight.tolist() == [4, 5, 6, 7]
+    assert normalization.running_mean.tolist() == [8, 9, 10, 11]
+    assert first.convolution.weight[0, 0, 0].tolist() == [16, 17, 18]
+    assert second.convolution.bias is not None
+    assert second.convolution.bias.tolist() == list(range(FIRST, FIRST + 6))
+
+
+@pytest.mark.parametrize(
+    ("numbers", "message"),
+    [
+        (
+            FIRST - 1,
+            rf"{FIRST} numbers in .* for layer 0, \[convolutional\] at line 4 of a\.cfg, found {FIRST - 1} left",
+        ),
+        (FIRST + 3, rf"{SECOND} numbers in .* for layer 1, \[convolutional\] at line 10 of a\.cfg, found 3 left"),
+        (FIRST + SECOND + 2, rf"{FIRST + SECOND} numbers in .* all layers of a\.cfg, found .* 2 too many"),
+    ],
+)
+def test_weights_that_do_not_fit_say_at_which_layer(tmp_path: Path, numbers: int, message: str) -> None:
+    with pytest.raises(ModelError, match=message) as caught:
+        load_weights(_network(), _write(tmp_path / "a.weights", numbers))
+    assert "\n" not in str(caught.value)
+
+
+def test_numbers_that_are_not_finite_say_in_which_layer(tmp_path: Path) -> None:
+    path = _write(tmp_path / "a.weights", FIRST + SECOND, nan_at=FIRST + 1)
+    with pytest.raises(ModelError, match=r"finite numbers in .* for layer 1"):
+        load_weights(_network(), path)
+
+
+def test_a_missing_an_empty_and_a_cut_file_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.weights"
+    with pytest.raises(ModelError, match="found No such file"):
+        load_weights(_network(), path)
+    path.write_bytes(b"")
+    with pytest.raises(ModelError, match="0 bytes, less than its header"):
+        load_weights(_network(), path)
+    path.write_bytes(_write(path, FIRST + SECOND).read_bytes()[:-3])
+    with pytest.raises(ModelError, match="1 bytes after the last one"):
+        load_weights(_network(), path)
