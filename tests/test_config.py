@@ -135,9 +135,7 @@ def test_a_reference_is_described_in_any_of_four_ways(reference: dict[str, objec
 
 
 def test_a_shape_that_cannot_be_is_a_ground_error() -> None:
-    settings = load_settings(
-        overrides={"ground": {"reference": {"sides_m": [1.0, 1.0, 1.0, 1.0], "diagonal_m": 9.0}}}
-    )
+    settings = load_settings(overrides={"ground": {"reference": {"sides_m": [1.0, 1.0, 1.0, 1.0], "diagonal_m": 9.0}}})
     with pytest.raises(GroundError):
         build_ground(settings)
 

@@ -84,7 +84,9 @@ def test_a_pair_is_measured_in_metres_from_foot_to_foot() -> None:
 def test_every_frame_reaches_every_sink_with_the_time_of_each_stage() -> None:
     memory = Memory()
     results = list(pipeline(frames(5), memory).run())
-    assert [result.frame.index for result in memory.results] == [result.frame.index for result in results] == [*range(5)]
+    assert (
+        [result.frame.index for result in memory.results] == [result.frame.index for result in results] == [*range(5)]
+    )
     stages = {"frames", "detect", "ground", "track", "locate", "proximity", "hazard", "sinks.sink0"}
     assert set(results[0].stage_ms) == stages
     assert memory.outcomes[0].status == "complete"

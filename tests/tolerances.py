@@ -55,3 +55,9 @@ RESIZED_CENTRE_PX = 0.02
 
 PEER_OVERLAP = 1e-6
 """supervision computes intersection over union in float32."""
+
+EDGE_PX = 0.03
+"""Mean position of a drawn edge: 64 samples a pixel (0.01 px) and 8-bit grey (0.005), and the parabola's own bias."""
+
+REFERENCE_GROUND_REL = 0.005
+"""Lengths of the reference's size, measured with it: corners good to 0.05-0.1 px of 100 px sides, on two sides."""

@@ -29,9 +29,9 @@ from standoff.stages.ground import (
     ReferenceGround,
     ReferenceParams,
     ReferenceShape,
-    load_survey,
     Unmapped,
     load_camera,
+    load_survey,
 )
 from standoff.stages.hazard import HazardMonitor, HazardParams
 from standoff.stages.locate import LocateParams, Locator
@@ -94,6 +94,7 @@ class ReferenceSettings(_Section):
             return ReferenceShape.rectangle(*self.rectangle_m)
         if self.sides_m is not None and self.diagonal_m is not None:
             return ReferenceShape.from_sides(self.sides_m, self.diagonal_m)
+        assert self.corners_m is not None, "checked in _one_shape"
         return ReferenceShape.from_corners(self.corners_m)
 
 

@@ -9,7 +9,7 @@ for result in open_run("site.mp4", "out", load_settings(Path("site.yaml"))):
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Generator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -48,7 +48,7 @@ class Run:
     pipeline: Pipeline
     folder: Path
 
-    def __iter__(self) -> Iterator[FrameResult]:
+    def __iter__(self) -> Generator[FrameResult, None, None]:
         """Yield each frame's result once it is written."""
         try:
             yield from self.pipeline.run()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Generator, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from time import perf_counter
@@ -44,7 +44,7 @@ class Pipeline:
     detect_every: int = 1
     sink_errors: dict[str, str] = field(default_factory=dict)
 
-    def run(self) -> Iterator[FrameResult]:
+    def run(self) -> Generator[FrameResult, None, None]:
         """Yield each frame's result after the sinks have it; close the sinks however the run ends."""
         outcome, time_s, count = Outcome("complete"), 0.0, 0
         try:

@@ -46,10 +46,7 @@ def _options(
 def main() -> None:
     """Run the command line and exit."""
     try:
-        app()
+        app(prog_name="standoff")
     except StandoffError as error:
         typer.echo(f"standoff: {error}", err=True)
         sys.exit(2)
-    except KeyboardInterrupt:
-        typer.echo("standoff: interrupted.", err=True)
-        sys.exit(1)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import json
 import signal
+from contextlib import closing
 from pathlib import Path
 from time import monotonic
-from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -96,7 +97,6 @@ def run(
     if ground_overrides := _ground_overrides(ground, reference_box, camera):
         overrides["ground"] = ground_overrides
     opened = open_run(source, out, load_settings(config, overrides), overwrite=overwrite)
-    signal.signal(signal.SIGTERM, _interrupt)
     try:
         _watch(opened, quiet=quiet)
     finally:
@@ -104,19 +104,34 @@ def run(
     raise typer.Exit(_status(out / RECORD))
 
 
-def _interrupt(number: int, stack: object) -> NoReturn:
-    """End a run that is asked to terminate as one that is interrupted at the keyboard: with whole files."""
-    raise KeyboardInterrupt
+class _StopRequest:
+    """Ctrl-C or a request to terminate ends the run after the frame in hand, so that all files agree.
+
+    A second one ends the program at once.
+    """
+
+    def __init__(self) -> None:
+        self.received = False
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._receive)
+
+    def _receive(self, number: int, stack: object) -> None:
+        self.received = True
+        signal.signal(number, signal.SIG_DFL)
 
 
 def _watch(opened: Run, *, quiet: bool) -> None:
     from standoff.cli.console import progress_bar
 
-    with progress_bar(quiet=quiet) as bar:
+    stop = _StopRequest()
+    results = iter(opened)
+    with closing(results), progress_bar(quiet=quiet) as bar:
         task = bar.add_task("monitoring", total=opened.source.frame_count, rate=0.0)
         started = monotonic()
-        for count, _ in enumerate(opened, start=1):
+        for count, _ in enumerate(results, start=1):
             bar.update(task, completed=count, rate=count / (monotonic() - started))
+            if stop.received:
+                break
 
 
 def _tell(record_file: Path, *, as_json: bool, quiet: bool) -> None:
@@ -142,8 +157,11 @@ def _tell(record_file: Path, *, as_json: bool, quiet: bool) -> None:
 
 
 def _status(record_file: Path) -> int:
-    """Return 1 for a run that ended well but did not measure anything or lost an output."""
+    """Return 1 for a run that was interrupted, did not measure anything, or lost an output."""
     record = json.loads(record_file.read_text(encoding="utf-8"))
+    if record["status"] == "interrupted":
+        typer.echo("standoff: interrupted; what was written up to then is whole.", err=True)
+        return 1
     unmeasured = record["counts"]["frames_with_map"] == 0
     if unmeasured:
         typer.echo("standoff: no frame could be measured; the reasons are above and in run.json.", err=True)

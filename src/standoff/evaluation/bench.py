@@ -62,7 +62,12 @@ def _times(times: StageTimes) -> dict[str, Any]:
 
 
 def bench_source(
-    source: Path, settings: Settings, *, frames: int = 300, darknet: tuple[Path, Path] | None = None
+    source: Path,
+    settings: Settings,
+    *,
+    frames: int = 300,
+    workload_frames: int = 200,
+    darknet: tuple[Path, Path] | None = None,
 ) -> BenchReport:
     """Run everything that is configured on a source, outputs included, and time it.
 
@@ -73,6 +78,7 @@ def bench_source(
         source: Video file or folder of pictures.
         settings: What to run; its outputs go to a folder that is removed afterwards.
         frames: At most so many.
+        workload_frames: How many of the made-up site.
         darknet: cfg and weights of the model, for OpenCV's time on the same network.
 
     Raises:
@@ -88,7 +94,10 @@ def bench_source(
         machine=machine(),
         source=described,
         stages=stages,
-        workload={"surveyed": monitor_workload(), "reference": monitor_workload(ground="reference")},
+        workload={
+            "surveyed": monitor_workload(frames=workload_frames),
+            "reference": monitor_workload(frames=workload_frames, ground="reference"),
+        },
         baselines=(*_picture_baselines(source, settings), *_detection_baselines(source, settings, darknet)),
     )
 

@@ -136,10 +136,7 @@ def _with_distractors(rng: np.random.Generator, picture: FloatArray, corners: Fl
         along = np.array([np.cos(angle), np.sin(angle)])
         across = np.array([along[1], -along[0]]) * rng.uniform(1.0, 8.0)
         along = along * rng.uniform(40.0, 150.0)
-        bar = np.array(
-            [centre + across - along, centre + across + along, centre - across + along, centre - across - along]
-        )
-        area = (bar[:, 0] * np.roll(bar[:, 1], -1) - bar[:, 1] * np.roll(bar[:, 0], -1)).sum()
+        bar = centre + np.array([across - along, -across - along, along - across, across + along])
         shade = rng.uniform(10.0, 32.0) * rng.choice([-1.0, 1.0])
-        picture = picture + area_coverage(bar[::-1]) * shade
+        picture = picture + area_coverage(bar) * shade
     return picture

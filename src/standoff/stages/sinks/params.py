@@ -52,12 +52,8 @@ class VideoParams:
 
 @dataclass(frozen=True, slots=True)
 class ReportParams:
-    """The report."""
+    """How much the report shows."""
 
-    danger_gap_m: Annotated[
-        float, Doc("Gap (distance less both action radii) that the danger limit is drawn at; m.")
-    ] = 0.0
-    warning_gap_m: Annotated[float, Doc("Gap that the warning limit is drawn at; m.")] = 3.0
     moments: Annotated[int, Interval(ge=0, le=24), Doc("Number of worst moments shown with their pictures.")] = 6
     pairs: Annotated[int, Interval(ge=1, le=500), Doc("Number of pairs whose curves are kept, the closest ones.")] = 50
     moment_width_px: Annotated[int, Interval(ge=320, le=1920), Doc("Width of those pictures; px.")] = 960

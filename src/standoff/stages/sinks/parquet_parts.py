@@ -43,6 +43,7 @@ class ParquetParts:
         self._rows = 0
         self._flushed_at = time.monotonic()
         self._parts: list[Path] = []
+        self._is_whole = True
         self._folder = parts_folder(path)
         self._folder.mkdir(exist_ok=True)
 
@@ -59,16 +60,23 @@ class ParquetParts:
         self._flushed_at = time.monotonic()
         if not self._rows:
             return
+        self._is_whole = False
         columns = [_joined([chunk[field.name] for chunk in self._chunks], field.type) for field in self._schema]
         part = self._folder / f"part-{len(self._parts):06d}.parquet"
         partial = partial_path(part)
         pq.write_table(pa.Table.from_arrays(columns, schema=self._schema), partial)
         partial.replace(part)
         self._parts.append(part)
+        self._is_whole = True
         self._chunks, self._rows = [], 0
 
     def close(self) -> None:
-        """Merge all parts under the final name and remove them."""
+        """Merge all parts under the final name and remove them.
+
+        When a part could not be written the others stay as they are: the final name is for whole tables only.
+        """
+        if not self._is_whole:
+            return
         self._flush()
         partial = partial_path(self._path)
         with pq.ParquetWriter(partial, self._schema) as writer:

@@ -33,17 +33,24 @@ class ReportSink:
 
     Args:
         path: The file, usually `report.html`.
-        params: Limits drawn, and how much is kept.
+        params: How much is kept.
         descriptions: What only the caller knows, by heading ("source", "model", "ground", "configuration"),
             shown as given.
+        warning_gap_m: Gap (distance less both action radii) below which the hazard stage warns, to be drawn;
+            below 0 the circles touch, which is danger.
     """
 
     def __init__(
-        self, path: Path | str, params: ReportParams | None = None, descriptions: Mapping[str, Any] | None = None
+        self,
+        path: Path | str,
+        params: ReportParams | None = None,
+        descriptions: Mapping[str, Any] | None = None,
+        *,
+        warning_gap_m: float = 1.0,
     ) -> None:
-        self._path, self._params = Path(path), params or ReportParams()
+        self._path, self._warning_gap_m = Path(path), warning_gap_m
         self._descriptions = dict(descriptions or {})
-        self._summary = RunSummary(self._params)
+        self._summary = RunSummary(params or ReportParams())
 
     def write(self, result: FrameResult) -> None:
         """Take one frame."""
@@ -54,11 +61,11 @@ class ReportSink:
         for event in outcome.hazards:
             self._summary.take_event(event)
         partial = partial_path(self._path)
-        partial.write_text(render(self._summary, outcome, self._params, self._descriptions), encoding="utf-8")
+        partial.write_text(render(self._summary, outcome, self._descriptions, self._warning_gap_m), encoding="utf-8")
         partial.replace(self._path)
 
 
-def render(summary: RunSummary, outcome: Outcome, params: ReportParams, descriptions: Mapping[str, Any]) -> str:
+def render(summary: RunSummary, outcome: Outcome, descriptions: Mapping[str, Any], warning_gap_m: float) -> str:
     """Return the page."""
     folder = files("standoff.stages.sinks")
     environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True)
@@ -66,21 +73,21 @@ def render(summary: RunSummary, outcome: Outcome, params: ReportParams, descript
     template = environment.from_string((folder / "report.html.j2").read_text(encoding="utf-8"))
     has_frames = summary.counts["frames"] > 0
     hazards = sorted(summary.hazards.values(), key=_gravest_first)
-    shown = summary.moments.worth_showing(params.warning_gap_m + _MOMENT_MARGIN_M)
+    shown = summary.moments.worth_showing(warning_gap_m + _MOMENT_MARGIN_M)
     return template.render(
         version=__version__,
         written_at=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         css=Markup((folder / "report.css").read_text(encoding="utf-8")),
         outcome=outcome,
         run=summary,
-        params=params,
+        warning_gap_m=warning_gap_m,
         unmeasured_frames=sum(summary.no_map_reasons.values()),
         closest=summary.site.closest,
         hazards=hazards[:_MOST_ROWS],
         hazards_left_out=max(0, len(hazards) - _MOST_ROWS) + summary.counts["hazards_left_out"],
         severities=Counter(hazard.severity for hazard in hazards),
-        site_chart=Markup(site_chart(summary, params)) if has_frames else "",
-        pair_charts=Markup(pair_charts(summary, params)),
+        site_chart=Markup(site_chart(summary, warning_gap_m)) if has_frames else "",
+        pair_charts=Markup(pair_charts(summary, warning_gap_m)),
         plan_chart=Markup(plan_chart(summary)),
         moments=[(moment, _data_uri(moment.jpeg())) for moment in shown],
         descriptions={heading: list(_flat(plain(value))) for heading, value in descriptions.items()},

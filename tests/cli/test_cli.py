@@ -1,0 +1,324 @@
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import av
+import cv2
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+import yaml
+
+from standoff.cli import main
+from standoff.core.types import Detections, Frame
+
+Call = Callable[..., tuple[int, str, str]]
+OUTPUTS = {"run.json", "tracks.parquet", "proximity.parquet", "frames.parquet", "hazards.jsonl", "annotated.mp4"}
+
+
+class Approach:
+    """A detector that sees a worker walk towards an excavator."""
+
+    def detect(self, frame: Frame) -> Detections:
+        left = 20.0 + 60.0 * frame.time_s
+        boxes = np.array([[left, 100.0, left + 12.0, 130.0], [240.0, 90.0, 300.0, 140.0]])
+        return Detections(boxes, np.array([0.9, 0.9]), np.array([0, 1]))
+
+
+@pytest.fixture
+def call(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Call:
+    """Run the program in this process; give its exit code, standard output and standard error."""
+
+    def run(*words: object) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["standoff", *map(str, words)])
+        before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+        try:
+            with pytest.raises(SystemExit) as left:
+                main()
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
+        printed = capsys.readouterr()
+        code = left.value.code
+        return code if isinstance(code, int) else int(code is not None), printed.out, printed.err
+
+    return run
+
+
+@pytest.fixture
+def video(tmp_path: Path) -> Path:
+    return make_video(tmp_path / "site.mp4", 34)
+
+
+@pytest.fixture
+def site(tmp_path: Path) -> Path:
+    """Settings with a scripted detector and a survey in which twenty pixels are a metre."""
+    survey = {
+        "image_size_px": [320, 240],
+        "points": [
+            {"name": f"{x},{y}", "px": [x, y], "m": [x / 20, (240 - y) / 20]} for x in (10, 300) for y in (60, 230)
+        ],
+    }
+    (tmp_path / "survey.yaml").write_text(yaml.safe_dump(survey), encoding="utf-8")
+    settings = {
+        "ground": {"survey": "survey.yaml"},
+        "replace": {"detect": {"factory": "cli.test_cli:Approach"}},
+        "locate": {"radius_m": {"worker": 1.0, "excavator": 3.0}},
+    }
+    path = tmp_path / "site.yaml"
+    path.write_text(yaml.safe_dump(settings), encoding="utf-8")
+    return path
+
+
+def make_video(path: Path, frames: int) -> Path:
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("mpeg4", rate=10)
+        stream.width, stream.height, stream.pix_fmt = 320, 240, "yuv420p"
+        for index in range(frames):
+            picture = np.full((240, 320, 3), 90 + index % 50, np.uint8)
+            for packet in stream.encode(av.VideoFrame.from_ndarray(picture, format="bgr24")):
+                container.mux(packet)
+        for packet in stream.encode():
+            container.mux(packet)
+    return path
+
+
+def test_a_run_writes_every_output_and_finds_the_hazard(call: Call, video: Path, site: Path, tmp_path: Path) -> None:
+    code, out, err = call("run", video, "--config", site, "--out", tmp_path / "out")
+    assert (code, err) == (0, "")
+    assert "complete" in out
+    assert {path.name for path in (tmp_path / "out").iterdir()} == OUTPUTS | {"report.html"}
+    distances = pq.read_table(tmp_path / "out" / "proximity.parquet").to_pydict()
+    expected_m = (270.0 - (26.0 + 60.0 * np.array(distances["time_s"]))) / 20.0
+    feet_m = (140.0 - 130.0) / 20.0
+    assert distances["distance_m"] == pytest.approx(np.hypot(expected_m, feet_m), abs=0.35)
+    events = [json.loads(line) for line in (tmp_path / "out" / "hazards.jsonl").read_text().splitlines()]
+    assert [events[0]["phase"], events[-1]["phase"]] == ["opened", "closed"]
+    assert len({event["hazard_id"] for event in events}) == 1
+    assert "danger" in {event["severity"] for event in events}
+    record = json.loads((tmp_path / "out" / "run.json").read_text())
+    assert record["status"] == "complete"
+    assert record["counts"]["frames"] == record["counts"]["frames_with_map"] == 34
+    assert record["settings"]["locate"]["radius_m"] == {"worker": 1.0, "excavator": 3.0}
+
+
+def test_json_prints_the_record_and_nothing_else(call: Call, video: Path, site: Path, tmp_path: Path) -> None:
+    code, out, err = call("run", video, "--config", site, "--out", tmp_path / "out", "--json")
+    assert (code, err) == (0, "")
+    assert json.loads(out)["status"] == "complete"
+
+
+def test_quiet_prints_nothing(call: Call, video: Path, site: Path, tmp_path: Path) -> None:
+    assert call("run", video, "--config", site, "--out", tmp_path / "out", "--quiet") == (0, "", "")
+
+
+@pytest.mark.parametrize("outputs", ["", "hazards", "tracks,proximity", "report"])
+def test_every_output_is_optional(call: Call, video: Path, site: Path, tmp_path: Path, outputs: str) -> None:
+    code, _, _ = call("run", video, "--config", site, "--out", tmp_path / "out", "--outputs", outputs)
+    files = {path.stem for path in (tmp_path / "out").iterdir()}
+    assert code == 0
+    assert files == {"run", *filter(None, outputs.split(","))}
+
+
+def test_start_stop_and_every_choose_the_frames(call: Call, video: Path, site: Path, tmp_path: Path) -> None:
+    words = ("--start", 1.0, "--stop", 2.0, "--every", 2, "--outputs", "frames")
+    assert call("run", video, "--config", site, "--out", tmp_path / "out", *words)[0] == 0
+    assert pq.read_table(tmp_path / "out" / "frames.parquet")["frame"].to_pylist() == [10, 12, 14, 16, 18]
+
+
+def test_a_run_in_which_nothing_could_be_measured_is_not_a_success(
+    call: Call, video: Path, site: Path, tmp_path: Path
+) -> None:
+    code, _, err = call("run", video, "--config", site, "--ground", "none", "--out", tmp_path / "out")
+    assert code == 1
+    assert "no frame could be measured" in err
+    table = pq.read_table(tmp_path / "out" / "proximity.parquet").to_pydict()
+    assert table["distance_m"] and set(table["distance_m"]) == {None}
+    assert not any(table["measured"])
+    reasons = pq.read_table(tmp_path / "out" / "frames.parquet")["map_reason"].to_pylist()
+    assert set(reasons) == {"no ground is configured"}
+
+
+def test_a_second_run_into_the_same_folder_needs_overwrite(call: Call, video: Path, site: Path, tmp_path: Path) -> None:
+    words = ("run", video, "--config", site, "--out", tmp_path / "out", "--outputs", "tracks", "--quiet")
+    assert call(*words)[0] == 0
+    before = (tmp_path / "out" / "run.json").read_text()
+    code, _, err = call(*words)
+    assert code == 2
+    assert "--overwrite" in err
+    assert (tmp_path / "out" / "run.json").read_text() == before
+    assert call(*words, "--overwrite")[0] == 0
+
+
+def _empty(folder: Path) -> Path:
+    (folder / "empty.mp4").touch()
+    return folder / "empty.mp4"
+
+
+def _text(folder: Path) -> Path:
+    (folder / "text.mp4").write_text("not a film\n" * 100)
+    return folder / "text.mp4"
+
+
+def _folder_with_strangers(folder: Path) -> Path:
+    (folder / "pictures").mkdir()
+    cv2.imwrite(str(folder / "pictures" / "1.png"), np.zeros((240, 320, 3), np.uint8))
+    (folder / "pictures" / "notes.txt").write_text("hello")
+    return folder / "pictures"
+
+
+@pytest.mark.parametrize(
+    ("make", "telling"),
+    [
+        (lambda folder: folder / "none.mp4", "none.mp4"),
+        (_empty, "empty"),
+        (_text, "text.mp4"),
+        (_folder_with_strangers, "notes.txt"),
+    ],
+)
+def test_a_bad_source_is_one_line_exit_2_and_no_folder(
+    call: Call, site: Path, tmp_path: Path, make: Callable[[Path], Path], telling: str
+) -> None:
+    code, out, err = call("run", make(tmp_path), "--config", site, "--fps", 10, "--out", tmp_path / "out")
+    assert (code, out) == (2, "")
+    assert err.startswith("standoff: expected ") and err.count("\n") == 1
+    assert telling in err
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "telling"),
+    [
+        (("--ground", "square:nonsense"), "--ground square:SIDE"),
+        (("--ground", "square:-1"), "square_m"),
+        (("--reference-box", "1,2,3"), "4 numbers"),
+        (("--ground", "none", "--reference-box", "1,2,3,4"), "--ground square:SIDE"),
+        (("--ground", "missing.yaml"), "missing.yaml"),
+        (("--camera", "missing.yaml"), "missing.yaml"),
+        (("--outputs", "film"), "film"),
+        (("--every", "0"), "every"),
+        (("--start", "100"), "100"),
+        (("--config", "missing.yaml"), "missing.yaml"),
+    ],
+)
+def test_a_bad_option_is_one_line_exit_2_and_no_folder(
+    call: Call, video: Path, site: Path, tmp_path: Path, words: tuple[str, ...], telling: str
+) -> None:
+    code, out, err = call("run", video, "--config", site, "--out", tmp_path / "out", *words)
+    assert (code, out) == (2, "")
+    assert err.startswith("standoff: expected ") and err.count("\n") == 1
+    assert telling in err
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_truncated_video_keeps_what_was_read_and_says_that_it_is_not_all(
+    call: Call, video: Path, site: Path, tmp_path: Path
+) -> None:
+    whole = make_video(tmp_path / "whole.avi", 200).read_bytes()
+    cut = tmp_path / "cut.avi"
+    cut.write_bytes(whole[: len(whole) // 2])
+    code, _, err = call("run", cut, "--config", site, "--out", tmp_path / "out", "--quiet")
+    assert code == 2
+    assert "frames" in err and err.count("\n") == 1
+    record = json.loads((tmp_path / "out" / "run.json").read_text())
+    assert record["status"] == "failed"
+    assert 0 < record["counts"]["frames"] < 200
+    assert pq.read_table(tmp_path / "out" / "frames.parquet").num_rows == record["counts"]["frames"]
+
+
+@pytest.mark.parametrize("ending", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_run_leaves_whole_files_that_say_so(
+    video: Path, site: Path, tmp_path: Path, ending: signal.Signals
+) -> None:
+    long = make_video(tmp_path / "long.mp4", 3000)
+    words = [sys.executable, "-c", "from standoff.cli import main; main()"]
+    words += ["run", str(long), "--config", str(site), "--out", str(tmp_path / "out"), "--quiet"]
+    search_path = os.pathsep.join(filter(None, [str(Path(__file__).parents[1]), os.environ.get("PYTHONPATH")]))
+    process = subprocess.Popen(words, env=os.environ | {"PYTHONPATH": search_path}, stderr=subprocess.PIPE, text=True)
+    film = tmp_path / "out" / "annotated.mp4"
+    deadline_s = time.monotonic() + 60
+    while not (film.exists() and film.stat().st_size > 0) and time.monotonic() < deadline_s:
+        time.sleep(0.05)
+    process.send_signal(ending)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert err.startswith("standoff: interrupted") and err.count("\n") == 1
+    record = json.loads((tmp_path / "out" / "run.json").read_text())
+    assert record["status"] == "interrupted"
+    assert pq.read_table(tmp_path / "out" / "frames.parquet").num_rows == record["counts"]["frames"] > 0
+    with av.open(str(film)) as container:
+        assert sum(1 for _ in container.decode(video=0)) == record["counts"]["frames"]
+    assert "interrupted" in (tmp_path / "out" / "report.html").read_text().lower()
+
+
+def test_the_settings_that_are_shown_can_be_run(call: Call, site: Path, tmp_path: Path) -> None:
+    code, out, _ = call("config", "show", "--config", site)
+    assert code == 0
+    (tmp_path / "shown.yaml").write_text(out)
+    first, second = (
+        json.loads(call("config", "show", "--config", path, "--json")[1]) for path in (site, tmp_path / "shown.yaml")
+    )
+    assert first == second
+
+
+def test_check_reads_the_files_that_the_settings_name(call: Call, site: Path, tmp_path: Path) -> None:
+    assert call("config", "check", site)[0] == 0
+    (tmp_path / "survey.yaml").unlink()
+    code, _, err = call("config", "check", site)
+    assert code == 2
+    assert "survey.yaml" in err
+
+
+@pytest.mark.parametrize(
+    "verb",
+    [
+        (),
+        ("run",),
+        ("export",),
+        ("calibrate",),
+        ("evaluate",),
+        ("evaluate", "positions"),
+        ("config",),
+        ("bench",),
+        ("doctor",),
+    ],
+)
+def test_every_verb_explains_itself(call: Call, verb: tuple[str, ...]) -> None:
+    code, out, _ = call(*verb, "--help")
+    assert code == 0
+    assert "Usage: standoff" in out
+
+
+def test_doctor_names_what_there_is(call: Call) -> None:
+    code, out, _ = call("doctor", "--json")
+    report = json.loads(out)
+    assert code == 0 and report["healthy"]
+    assert {"onnxruntime", "CPUExecutionProvider"} <= {row["name"] for row in report["findings"] if row["ok"]}
+
+
+def test_the_boards_give_the_papers_tables(call: Call, shared_data: Path, tmp_path: Path) -> None:
+    code, out, _ = call(
+        "evaluate", "checkerboard", shared_data / "checkerboards", "--json", tmp_path / "f.json", "--full",
+        "--figure", tmp_path / "f.png",
+    )  # fmt: skip
+    figures = json.loads((tmp_path / "f.json").read_text())
+    assert code == 0
+    assert "Table 5" in out
+    assert 87 <= figures["before_percent"] <= 92 and 97.0 <= figures["after_percent"] <= 97.8
+    assert len(figures["per_view"]) == 13
+    assert (tmp_path / "f.png").stat().st_size > 10_000
+
+
+def test_a_camera_is_calibrated_and_can_be_used(call: Call, shared_data: Path, tmp_path: Path) -> None:
+    camera = tmp_path / "camera.yaml"
+    assert call("calibrate", shared_data / "checkerboards", "--out", camera)[0] == 0
+    code, out, _ = call("evaluate", "checkerboard", shared_data / "checkerboards", "--camera", camera, "--json", "-")
+    assert code == 0
+    assert json.loads(out)["after_percent"] > 97.9
