@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from standoff.core.types import ImageArray
-from standoff.stages.frames import AvPicture, open_source
+from standoff.stages.frames import AvPicture, Scaler, open_source
 
 SIZES_PX = [(1920, 1080), (3840, 2160)]
 FRAMES = 30
@@ -72,10 +72,13 @@ def test_decode_thirty_frames(benchmark: Callable[..., Any], video: Path, reader
 def test_make_the_detectors_picture(benchmark: Callable[..., Any], size_px: tuple[int, int], maker: str) -> None:
     benchmark.group = f"416 px wide, from {size_px[1]}p"  # type: ignore[attr-defined]
     frame = av.VideoFrame.from_ndarray(texture(size_px), format="bgr24").reformat(format="yuv420p")
+    scaler = Scaler()
     make = {
-        "standoff": lambda: AvPicture(frame).resized_bgr(416, 234),
-        "BGR, cv2.resize area": lambda: cv2.resize(AvPicture(frame).bgr(), (416, 234), interpolation=cv2.INTER_AREA),
-        "BGR, cv2.resize linear (aliases)": lambda: cv2.resize(AvPicture(frame).bgr(), (416, 234)),
+        "standoff": lambda: AvPicture(frame, scaler=scaler).resized_bgr(416, 234),
+        "BGR, cv2.resize area": lambda: cv2.resize(
+            AvPicture(frame, scaler=scaler).bgr(), (416, 234), interpolation=cv2.INTER_AREA
+        ),
+        "BGR, cv2.resize linear (aliases)": lambda: cv2.resize(AvPicture(frame, scaler=scaler).bgr(), (416, 234)),
     }[maker]
     assert benchmark(make).shape == (234, 416, 3)
 
@@ -85,8 +88,9 @@ def test_make_the_detectors_picture(benchmark: Callable[..., Any], size_px: tupl
 def test_make_the_gray_picture(benchmark: Callable[..., Any], size_px: tuple[int, int], maker: str) -> None:
     benchmark.group = f"gray, {size_px[1]}p"  # type: ignore[attr-defined]
     frame = av.VideoFrame.from_ndarray(texture(size_px), format="bgr24").reformat(format="yuv420p")
+    scaler = Scaler()
     make = {
-        "standoff": lambda: AvPicture(frame).gray(),
-        "BGR, cv2.cvtColor": lambda: cv2.cvtColor(AvPicture(frame).bgr(), cv2.COLOR_BGR2GRAY),
+        "standoff": lambda: AvPicture(frame, scaler=scaler).gray(),
+        "BGR, cv2.cvtColor": lambda: cv2.cvtColor(AvPicture(frame, scaler=scaler).bgr(), cv2.COLOR_BGR2GRAY),
     }[maker]
     assert benchmark(make).shape == size_px[::-1]

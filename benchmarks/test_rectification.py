@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+
 from standoff.evaluation.drawn_quadrilaterals import draw_scene
 from standoff.evaluation.rectification import METHODS, paper_edges, ransac_by_loop
 from standoff.stages.ground.lines import ransac_contours, sample_pairs

@@ -52,7 +52,7 @@ def test_peer_byte_track(benchmark: BenchmarkFixture) -> None:
 
     def follow() -> int:
         peer = trackers.ByteTrackTracker(
-            lost_track_buffer=round(30 * params.max_coast_s),
+            lost_track_buffer=round(30 * params.max_lost_s),
             frame_rate=FRAMES_PER_S,
             track_activation_threshold=params.start_score,
             high_conf_det_threshold=params.high_score,

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+
 from standoff.core import homography
 from standoff.core.camera import Camera
 from standoff.core.homography import FloatArray
@@ -25,11 +26,11 @@ class GrayPicture:
 
     @property
     def width_px(self) -> int:
-        return self.pixels.shape[1]
+        return int(self.pixels.shape[1])
 
     @property
     def height_px(self) -> int:
-        return self.pixels.shape[0]
+        return int(self.pixels.shape[0])
 
     def bgr(self) -> ImageArray:
         return np.repeat(self.pixels[..., None], 3, axis=2)
@@ -81,9 +82,11 @@ def picture(ground_to_image: FloatArray, corners_m: FloatArray, camera: Camera, 
     shade = np.where(inside, 190.0 + 0.3 * _ROUGHNESS[row, column], 90.0 + _ROUGHNESS[row, column])
     grid = shade.reshape(height, _SUBPIXELS, width, _SUBPIXELS).mean(axis=(1, 3))
     grid += np.random.default_rng(0).normal(0.0, noise, grid.shape)
-    return np.clip(np.rint(grid), 0, 255).astype(np.uint8)
+    return np.asarray(np.clip(np.rint(grid), 0, 255), dtype=np.uint8)
 
 
-def box_around(ground_to_image: FloatArray, corners_m: FloatArray, camera: Camera, margin_px: float = 6.0) -> FloatArray:
+def box_around(
+    ground_to_image: FloatArray, corners_m: FloatArray, camera: Camera, margin_px: float = 6.0
+) -> FloatArray:
     corners_px = camera.distort(homography.apply(ground_to_image, corners_m)[0])
     return np.concatenate([corners_px.min(axis=0) - margin_px, corners_px.max(axis=0) + margin_px])

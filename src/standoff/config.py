@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import difflib
 import importlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import is_dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_type_hints
@@ -41,6 +41,7 @@ from standoff.stages.track import Tracker, TrackParams
 
 Point = tuple[float, float]
 StageName = Literal["detect", "ground", "track", "locate", "proximity", "hazard"]
+STAGE_NAMES: tuple[StageName, ...] = ("detect", "ground", "track", "locate", "proximity", "hazard")
 OutputName = Literal["tracks", "proximity", "frames", "hazards", "video", "report"]
 OUTPUT_NAMES: tuple[OutputName, ...] = ("tracks", "proximity", "frames", "hazards", "video", "report")
 
@@ -311,6 +312,27 @@ def build_ground(settings: Settings) -> Ground:
     )
 
 
+_MAKERS: Mapping[StageName, Callable[[Settings], Any]] = {
+    "detect": build_detector,
+    "ground": build_ground,
+    "track": lambda settings: Tracker(settings.track),
+    "locate": lambda settings: Locator(settings.locate),
+    "proximity": lambda settings: ProximityMeter(settings.proximity),
+    "hazard": lambda settings: HazardMonitor(settings.hazard),
+}
+
+
+def build_stage(name: StageName, settings: Settings) -> Any:  # noqa: ANN401
+    """Make one stage, standoff's own or the configured replacement.
+
+    Raises:
+        StandoffError: Something that the settings name cannot be used.
+    """
+    if name in settings.replace:
+        return build_replacement(name, settings.replace[name])
+    return _MAKERS[name](settings)
+
+
 def build_pipeline(settings: Settings, frames: Iterable[Frame], sinks: Mapping[str, Sink] | None = None) -> Pipeline:
     """Make one stream's pipeline; all state belongs to the objects made here.
 
@@ -322,15 +344,14 @@ def build_pipeline(settings: Settings, frames: Iterable[Frame], sinks: Mapping[s
     Raises:
         StandoffError: A model, survey, camera or replacement that cannot be used.
     """
-    own: dict[str, Any] = {name: build_replacement(name, replacement) for name, replacement in settings.replace.items()}
     return Pipeline(
         frames=frames,
-        detector=own.get("detect") or build_detector(settings),
-        ground=own.get("ground") or build_ground(settings),
-        tracker=own.get("track") or Tracker(settings.track),
-        locator=own.get("locate") or Locator(settings.locate),
-        proximity=own.get("proximity") or ProximityMeter(settings.proximity),
-        hazard=own.get("hazard") or HazardMonitor(settings.hazard),
+        detector=build_stage("detect", settings),
+        ground=build_stage("ground", settings),
+        tracker=build_stage("track", settings),
+        locator=build_stage("locate", settings),
+        proximity=build_stage("proximity", settings),
+        hazard=build_stage("hazard", settings),
         sinks=dict(sinks or {}),
         detect_every=settings.detect_every,
     )

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from standoff.evaluation.drawn_quadrilaterals import DIFFICULTIES, area_coverage, draw_scene
 from standoff.evaluation.rectification import METHODS, MethodScore, RectificationResult, evaluate_rectification
 

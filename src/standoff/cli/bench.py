@@ -2,6 +2,67 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
-def bench() -> None:
-    """X."""
+import typer
+
+from standoff.core.errors import ConfigError
+
+if TYPE_CHECKING:
+    from standoff.evaluation.timing import Spread
+
+
+def bench(
+    source: Annotated[Path, typer.Argument(help="Video file, or a folder of pictures.", show_default=False)],
+    config: Annotated[Path | None, typer.Option(help="Settings, YAML.")] = None,
+    model: Annotated[Path | None, typer.Option(help="Detector, ONNX.")] = None,
+    frames: Annotated[int, typer.Option(min=2, help="At most so many frames of the source.")] = 200,
+    darknet: Annotated[
+        str | None, typer.Option(help="CFG,WEIGHTS of the same network: times OpenCV on it beside ONNX Runtime.")
+    ] = None,
+    json_file: Annotated[
+        Path | None, typer.Option("--json", help="Also write the result as JSON; - prints it.")
+    ] = None,
+) -> None:
+    """Time every stage on a source, and the monitor's own work at 1080p with ten tracks."""
+    from standoff.cli.console import print_table, write_json
+    from standoff.config import load_settings
+    from standoff.evaluation.bench import OWN_WORK_LIMIT_MS, bench_source
+
+    settings = load_settings(config, {"model": model} if model else {})
+    report = bench_source(source, settings, frames=frames, darknet=_two_files(darknet))
+    if json_file is not None:
+        write_json(report.to_dict(), json_file)
+    if str(json_file) == "-":
+        return
+    machine = report.machine
+    where = f"{machine['cpu']}, {machine['cores']} cores"
+    runs = {f"stages on {source.name}": report.stages}
+    runs |= {f"made-up site, 1080p, ten tracks, {kind} ground": times for kind, times in report.workload.items()}
+    for title, times in runs.items():
+        rows = [_row(stage, spread) for stage, spread in times.by_stage().items()]
+        rows += [_row("the monitor's own work", times.own_work()), _row("all", times.total())]
+        print_table(f"{title} ({where}), ms a frame", ("stage", "median", "10 %", "90 %", "frames"), rows)
+    rows = [
+        (baseline.name, baseline.ours, f"{baseline.ours_ms.median_ms:.2f}", baseline.theirs,
+         f"{baseline.theirs_ms.median_ms:.2f}", f"{baseline.ratio:.1f}")
+        for baseline in report.baselines
+    ]  # fmt: skip
+    columns = ("work", "standoff", "ms", "baseline", "ms", "times faster")
+    print_table(
+        "Baselines in the same run, medians", columns, rows, f"Own work should stay under {OWN_WORK_LIMIT_MS:g} ms."
+    )
+
+
+def _row(stage: str, spread: Spread) -> tuple[str, ...]:
+    return stage, f"{spread.median_ms:.3f}", f"{spread.p10_ms:.3f}", f"{spread.p90_ms:.3f}", str(spread.samples)
+
+
+def _two_files(text: str | None) -> tuple[Path, Path] | None:
+    if text is None:
+        return None
+    cfg, comma, weights = text.partition(",")
+    if not (comma and cfg and weights):
+        raise ConfigError(expected="--darknet CFG,WEIGHTS", found=repr(text), fix="give both files with a comma")
+    return Path(cfg), Path(weights)

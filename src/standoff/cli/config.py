@@ -78,8 +78,12 @@ def show(
 @app.command()
 def check(file: Annotated[Path, typer.Argument(help="Settings, YAML.", show_default=False)]) -> None:
     """Check a settings file and everything that it points to: model, survey, camera, shapes."""
-    from standoff.config import build_pipeline, load_settings
+    from standoff.config import STAGE_NAMES, build_stage, load_settings
 
     settings = load_settings(file)
-    build_pipeline(settings, frames=())
+    for name in STAGE_NAMES:
+        if name == "detect" and settings.model is None and name not in settings.replace:
+            typer.echo(f"{file} names no model: pass --model to run.")
+        else:
+            build_stage(name, settings)
     typer.echo(f"{file}: all settings are valid, and the files that they name can be used.")

@@ -23,7 +23,7 @@ from standoff.core.protocols import Ground
 from standoff.core.types import Detections, Frame, FrameResult, ImageArray, Outcome, Sink
 from standoff.evaluation.timing import StageTimes, collect_times
 from standoff.pipeline import Pipeline
-from standoff.stages.frames import AvPicture
+from standoff.stages.frames import AvPicture, Scaler
 from standoff.stages.ground import ReferenceGround, ReferenceShape, SurveyedGround
 from standoff.stages.hazard import HazardMonitor
 from standoff.stages.locate import Locator
@@ -121,8 +121,9 @@ class Site:
     def frames(self, count: int) -> Iterator[Frame]:
         """Yield the same YUV picture again and again, unconverted each time."""
         decoded = av.VideoFrame.from_ndarray(self.picture(), format="bgr24").reformat(format="yuv420p")
+        scaler = Scaler()
         for index in range(count):
-            yield Frame("workload", index, index / _RATE_FPS, AvPicture(decoded))
+            yield Frame("workload", index, index / _RATE_FPS, AvPicture(decoded, scaler=scaler))
 
     def ground(self, kind: Literal["surveyed", "reference"]) -> Ground:
         """Return a ground stage that knows the site."""

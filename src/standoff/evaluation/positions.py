@@ -35,7 +35,6 @@ from standoff.evaluation.positions_input import (
 from standoff.stages.track.association import assign, overlaps
 
 NOTE = "Precision is a lower bound where not everybody is labelled. Missed truth and unmeasured pairs are counted."
-_MIN_OVERLAP = 0.5
 _MAX_GROUND_M = 2.0
 _NO_TRACK = -1
 
@@ -105,6 +104,7 @@ class PositionsResult:
         frames: Number of scored frames.
         frames_without_tracks: Of these, those in which the run reports nobody; their truth is missed.
         pairs_up_to_m: Largest true distance of a scored pair.
+        min_overlap: Smallest IoU of a match.
         entities: With all reported tracks.
         pairs: The same.
         observed_entities: Without tracks that coast.
@@ -116,6 +116,7 @@ class PositionsResult:
     frames: int
     frames_without_tracks: int
     pairs_up_to_m: float
+    min_overlap: float
     entities: EntityScore
     pairs: PairScore
     observed_entities: EntityScore
@@ -126,7 +127,7 @@ class PositionsResult:
         observed = asdict(self.observed_entities) | asdict(self.observed_pairs)
         figures = asdict(self.entities) | asdict(self.pairs)
         figures |= {f"observed_{name}": value for name, value in observed.items()}
-        for name in ("first_frame", "last_frame", "frames", "frames_without_tracks", "pairs_up_to_m"):
+        for name in ("first_frame", "last_frame", "frames", "frames_without_tracks", "pairs_up_to_m", "min_overlap"):
             figures[name] = getattr(self, name)
         return {name: value if np.isfinite(value) else None for name, value in figures.items()}
 
@@ -137,6 +138,7 @@ def evaluate_positions(
     *,
     frames: tuple[int, int] | None = None,
     pairs_up_to_m: float = 15.0,
+    min_overlap: float = 0.5,
     class_name: str = "worker",
 ) -> PositionsResult:
     """Compare a run's tables with a truth file.
@@ -146,6 +148,7 @@ def evaluate_positions(
         truth_file: CSV as at this module's head.
         frames: First and last truth frame, from 1, completely labelled between; None: the frames that have labels.
         pairs_up_to_m: Pairs that are truly further apart are not scored.
+        min_overlap: Smallest IoU of a track's box with the true one; unused where the truth has no boxes.
         class_name: What the truth shows; tracks of other classes are left out.
 
     Raises:
@@ -154,7 +157,9 @@ def evaluate_positions(
     tracks = read_run_table(Path(run_folder) / "tracks.parquet", TRACK_COLUMNS)
     pairs = read_run_table(Path(run_folder) / "proximity.parquet", PAIR_COLUMNS)
     tracks = chosen_rows(tracks, tracks["class"] == class_name)
-    return score_positions(tracks, pairs, read_truth(truth_file), frames=frames, pairs_up_to_m=pairs_up_to_m)
+    return score_positions(
+        tracks, pairs, read_truth(truth_file), frames=frames, pairs_up_to_m=pairs_up_to_m, min_overlap=min_overlap
+    )
 
 
 def score_positions(
@@ -164,6 +169,7 @@ def score_positions(
     *,
     frames: tuple[int, int] | None = None,
     pairs_up_to_m: float = 15.0,
+    min_overlap: float = 0.5,
 ) -> PositionsResult:
     """Compare tracks and distances with truth, given as columns.
 
@@ -173,6 +179,7 @@ def score_positions(
         truth: As from `read_truth`.
         frames: As for `evaluate_positions`.
         pairs_up_to_m: As for `evaluate_positions`.
+        min_overlap: As for `evaluate_positions`.
 
     Raises:
         DataError: Nothing to score in these frames, or the run was not asked for such pairs.
@@ -184,15 +191,17 @@ def score_positions(
         raise DataError(expected="truth with conf above 0", found=found, fix="choose frames that are labelled")
     tracks = chosen_rows(tracks, np.isin(tracks["frame"] + 1, scored))
     distances = _by_pair(chosen_rows(pairs, np.isin(pairs["frame"] + 1, scored)))
-    entities, pair_score = _score(truth, tracks, distances, pairs_up_to_m)
     observed = chosen_rows(tracks, tracks["observed"].astype(np.bool_))
-    observed_entities, observed_pairs = _score(truth, observed, distances, pairs_up_to_m)
+    (entities, pair_score), (observed_entities, observed_pairs) = (
+        _score(truth, rows, _match(truth, rows, min_overlap), distances, pairs_up_to_m) for rows in (tracks, observed)
+    )
     return PositionsResult(
         first_frame=int(scored[0]),
         last_frame=int(scored[-1]),
         frames=len(scored),
         frames_without_tracks=len(scored) - len(np.unique(tracks["frame"])),
         pairs_up_to_m=pairs_up_to_m,
+        min_overlap=min_overlap,
         entities=entities,
         pairs=pair_score,
         observed_entities=observed_entities,
@@ -208,9 +217,8 @@ def _by_pair(pairs: Columns) -> _Distances:
 
 
 def _score(
-    truth: Columns, tracks: Columns, distances: _Distances, pairs_up_to_m: float
+    truth: Columns, tracks: Columns, track_row: IntArray, distances: _Distances, pairs_up_to_m: float
 ) -> tuple[EntityScore, PairScore]:
-    track_row = _match(truth, tracks)
     is_scored = truth["conf"] > 0
     ignored_tracks = int((track_row[~is_scored] != _NO_TRACK).sum())
     truth, track_row = chosen_rows(truth, is_scored), track_row[is_scored]
@@ -221,11 +229,11 @@ def _score(
     return entities, _score_pairs(truth, track_id, distances, pairs_up_to_m)
 
 
-def _match(truth: Columns, tracks: Columns) -> IntArray:
+def _match(truth: Columns, tracks: Columns, min_overlap: float) -> IntArray:
     """Return for every truth row the row of its track, or -1."""
     track_row = np.full(len(truth["frame"]), _NO_TRACK)
     has_boxes = not np.isnan(truth["x"]).all()
-    similarity, at_least = (_overlap, _MIN_OVERLAP) if has_boxes else (_nearness, 1.0 / (1.0 + _MAX_GROUND_M))
+    similarity, at_least = (_overlap, min_overlap) if has_boxes else (_nearness, 1.0 / (1.0 + _MAX_GROUND_M))
     for frame in np.unique(truth["frame"]):
         rows, columns = np.flatnonzero(truth["frame"] == frame), np.flatnonzero(tracks["frame"] == frame - 1)
         first, second = assign(similarity(chosen_rows(truth, rows), chosen_rows(tracks, columns)), at_least)

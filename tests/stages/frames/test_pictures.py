@@ -13,7 +13,7 @@ from stages.frames.coded_video import Recipe, coded_picture, write_video
 from tolerances import GRAY_LEVELS, RESIZED_LEVELS, SWSCALE_LEVELS
 
 from standoff.core.types import ImageArray, Picture
-from standoff.stages.frames import ArrayPicture, AvPicture, frame_from_array, open_source
+from standoff.stages.frames import ArrayPicture, AvPicture, Scaler, frame_from_array, open_source
 
 FORMATS = ["yuv420p", "yuvj420p", "yuv422p", "yuv444p", "nv12", "gray", "rgb24", "bgr24", "yuv420p10le", "rgba"]
 LIMITED, FULL = 1, 2
@@ -93,6 +93,28 @@ def test_shrinking_does_not_alias() -> None:
     stripes[:, ::2] = 255
     for picture in (AvPicture(decoded(stripes, "yuv444p")), ArrayPicture(stripes)):
         assert picture.resized_bgr(40, 30).std() < 1
+
+
+def test_a_shared_scaler_remembers_nothing_of_the_picture_before() -> None:
+    frames = [
+        decoded(smooth(*size, seed=seed), pixel_format, color_range)
+        for seed, size in enumerate([(96, 64), (97, 65), (130, 82)])
+        for pixel_format, color_range in (("yuv420p", LIMITED), ("yuv420p", FULL), ("rgb24", 0), ("yuv420p10le", 0))
+    ]
+    scaler = Scaler()
+    for frame in frames + frames[::-1]:
+        shared, alone = AvPicture(frame, scaler=scaler), AvPicture(frame)
+        assert np.array_equal(shared.bgr(), alone.bgr())
+        assert np.array_equal(shared.resized_bgr(48, 32), alone.resized_bgr(48, 32))
+
+
+def test_a_resized_picture_belongs_to_who_asked_for_it() -> None:
+    for pixel_format in ("bgr24", "yuv420p"):
+        picture = AvPicture(decoded(smooth(96, 64), pixel_format))
+        kept = picture.bgr().copy()
+        for size in ((96, 64), (48, 32)):
+            picture.resized_bgr(*size)[:] = 0
+        assert np.array_equal(picture.bgr(), kept)
 
 
 @pytest.mark.parametrize("kind", ["decoded", "array"])

@@ -5,6 +5,7 @@ import pytest
 from drawn_ground import SIZE_PX, lens, view
 from hypothesis import given
 from hypothesis import strategies as st
+
 from standoff.core import homography
 from standoff.stages.ground.correspondence import camera_misfit_px, turn_from_before
 from standoff.stages.ground.shape import ReferenceShape
@@ -32,7 +33,9 @@ def test_the_true_order_of_corners_is_one_that_a_camera_could_see(
 
 
 @given(st.floats(5.0, 40.0), yaws, st.sampled_from([FOOTING, PLANK]))
-def test_a_known_camera_tells_the_corners_of_an_uneven_shape_apart(tilt: float, yaw: float, shape: ReferenceShape) -> None:
+def test_a_known_camera_tells_the_corners_of_an_uneven_shape_apart(
+    tilt: float, yaw: float, shape: ReferenceShape
+) -> None:
     camera = lens()
     corners_px, _ = homography.apply(view(camera, (1.0, 1.0), 14.0, tilt, yaw), shape.corners_m)
     misfit = camera_misfit_px(corners_px, shape, SIZE_PX, FOCAL_WIDTHS, camera)

@@ -5,25 +5,32 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 from skimage.feature import canny as skimage_canny
+from tolerances import EDGE_PX
+
+from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import ImageArray
 from standoff.evaluation.drawn_quadrilaterals import draw_scene
 from standoff.stages.ground.edges import between_pixels, canny, sobel_gradients
-from tolerances import EDGE_PX
 
 WHOLE = np.array([0.0, 0.0, 319.0, 319.0])
 
 
-def shared(first: np.ndarray[tuple[int, ...], np.dtype[np.float64]],
-           second: np.ndarray[tuple[int, ...], np.dtype[np.float64]], within_px: float) -> float:
+def shared(
+    first: FloatArray,
+    second: FloatArray,
+    within_px: float,
+) -> float:
     """Return the smaller share of points of one set that have a neighbour in the other."""
     one, two = cKDTree(first), cKDTree(second)
     return min(
-        float((two.query(first)[0] <= within_px).mean()),
-        float((one.query(second)[0] <= within_px).mean()),
+        float(np.mean(two.query(first)[0] <= within_px)),
+        float(np.mean(one.query(second)[0] <= within_px)),
     )
 
 
-def points_of(mask: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+def points_of(
+    mask: BoolArray,
+) -> FloatArray:
     rows, columns = np.nonzero(mask)
     return np.column_stack([columns, rows]).astype(np.float64)
 
@@ -49,8 +56,9 @@ def test_edges_agree_with_scikit_images_canny(seed: int) -> None:
     assert gradients is not None
     edges = canny(gradients, 0.6, 0.24)
     largest = float(np.hypot(gradients.dx, gradients.dy).max())
-    # scikit-image's Sobel is the mean over four pixels and its magnitude is that of the same Gaussian's.
-    theirs = skimage_canny(gray.astype(float), sigma=1.0, low_threshold=0.24 * largest / 4, high_threshold=0.6 * largest / 4)
+    # scikit-image's Sobel is OpenCV's over four.
+    low, high = 0.24 * largest / 4.0, 0.6 * largest / 4.0
+    theirs = skimage_canny(gray.astype(float), sigma=1.0, low_threshold=low, high_threshold=high)
     assert shared(edges.points_px, points_of(theirs), 1.0) > 0.95
 
 
@@ -100,7 +108,7 @@ def test_points_between_pixels_lie_on_the_true_edge(angle_deg: float) -> None:
     assert (fine.direction @ normal > 0.99).all()
 
 
-def half_plane(normal: np.ndarray[tuple[int, ...], np.dtype[np.float64]], offset: float) -> tuple[ImageArray, float]:
+def half_plane(normal: FloatArray, offset: float) -> tuple[ImageArray, float]:
     steps = (np.arange(8) + 0.5) / 8 - 0.5
     fine = (np.arange(120)[:, None] + steps).ravel()
     bright = fine[None, :] * normal[0] + fine[:, None] * normal[1] + offset > 0

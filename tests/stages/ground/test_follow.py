@@ -3,14 +3,20 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
+
+from standoff.core.homography import FloatArray
 from standoff.core.types import ImageArray
 from standoff.stages.ground.follow import BoxFollower, moved_box
 
-ROUGH = cv2.GaussianBlur(np.random.default_rng(2).normal(120.0, 300.0, (400, 500)), (0, 0), 3.0).clip(0, 255).astype(np.uint8)
+ROUGH = (
+    cv2.GaussianBlur(np.random.default_rng(2).normal(120.0, 300.0, (400, 500)), (0, 0), 3.0)
+    .clip(0, 255)
+    .astype(np.uint8)
+)
 BOX = np.array([200.0, 150.0, 280.0, 230.0])
 
 
-def moved(angle_deg: float, zoom: float, shift: tuple[float, float]) -> tuple[ImageArray, np.ndarray[tuple[int, ...], np.dtype[np.float64]]]:
+def moved(angle_deg: float, zoom: float, shift: tuple[float, float]) -> tuple[ImageArray, FloatArray]:
     motion = cv2.getRotationMatrix2D((240.0, 190.0), angle_deg, zoom)
     motion[:, 2] += shift
     return cv2.warpAffine(ROUGH, motion, (500, 400), borderMode=cv2.BORDER_REFLECT), motion

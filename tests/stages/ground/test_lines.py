@@ -5,6 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from skimage.measure import LineModelND
+from tolerances import GEOMETRY_REL
+
 from standoff.evaluation.drawn_quadrilaterals import draw_scene
 from standoff.evaluation.rectification import paper_edges, ransac_by_loop
 from standoff.stages.ground.lines import (
@@ -16,7 +18,6 @@ from standoff.stages.ground.lines import (
     refit,
     sample_pairs,
 )
-from tolerances import GEOMETRY_REL
 
 
 @pytest.mark.parametrize("seed", range(4))

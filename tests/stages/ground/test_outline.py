@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from standoff.core.types import NoGroundMap
+
+from standoff.core.homography import FloatArray
+from standoff.core.types import ImageArray, NoGroundMap
 from standoff.evaluation.drawn_quadrilaterals import draw_scene
 from standoff.evaluation.rectification import corner_errors
 from standoff.stages.ground.oriented import RIVALS
@@ -17,8 +19,11 @@ FINDERS = {method: OutlineFinder(ReferenceParams(method=method)) for method in M
 WORST_PX = {"paper": 3.0, "paper+tls": 0.6, "oriented": 0.15}
 
 
-def found(method: ReferenceMethod, gray: np.ndarray[tuple[int, ...], np.dtype[np.uint8]],
-          box: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> Quadrilateral:
+def found(
+    method: ReferenceMethod,
+    gray: ImageArray,
+    box: FloatArray,
+) -> Quadrilateral:
     outline = FINDERS[method].find(gray, box)
     assert isinstance(outline, Quadrilateral), outline.reason
     return outline
@@ -51,7 +56,7 @@ def test_corners_move_with_the_picture(right: int, down: int, method: ReferenceM
     shifted = np.roll(gray, (down, right), axis=(0, 1))
     box = scene.box_xyxy_px + 60.0
     here = found(method, gray, box).corners_px
-    there = found(method, shifted, box + [right, down, right, down]).corners_px
+    there = found(method, shifted, box + np.array([right, down, right, down])).corners_px
     np.testing.assert_allclose(there - here, np.broadcast_to([right, down], (4, 2)), atol=1e-6)
 
 

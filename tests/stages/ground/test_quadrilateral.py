@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
+from standoff.core.homography import FloatArray
 from standoff.evaluation.drawn_quadrilaterals import draw_scene
 from standoff.stages.ground.lines import line_through
 from standoff.stages.ground.quadrilateral import (
@@ -23,11 +25,15 @@ BOX = np.array([0.0, 0.0, 100.0, 100.0])
 SQUARE = np.array([[10.0, 10.0], [10.0, 90.0], [90.0, 90.0], [90.0, 10.0]])
 
 
-def side_lines(corners: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+def side_lines(
+    corners: FloatArray,
+) -> FloatArray:
     return np.array([line_through(corners[k], corners[(k + 1) % 4]) for k in range(4)])
 
 
-@given(st.integers(0, 200), st.sampled_from(list(permutations(range(4)))), st.lists(st.booleans(), min_size=4, max_size=4))
+@given(
+    st.integers(0, 200), st.sampled_from(list(permutations(range(4)))), st.lists(st.booleans(), min_size=4, max_size=4)
+)
 def test_sides_in_any_order_and_sign_give_the_same_quadrilateral(
     seed: int, order: tuple[int, ...], flips: list[bool]
 ) -> None:
@@ -91,13 +97,13 @@ def test_a_given_sigma_is_the_corners_sigma() -> None:
     ("corners", "support", "reason"),
     [
         (SQUARE, 0.9, None),
-        (SQUARE + [0.0, 25.0], 0.9, OUTSIDE_BOX),
+        (SQUARE + np.array([0.0, 25.0]), 0.9, OUTSIDE_BOX),
         (SQUARE * 0.4, 0.9, TOO_SMALL),
         (SQUARE, 0.3, UNSUPPORTED),
     ],
 )
 def test_an_outline_that_cannot_be_the_reference_in_its_box_is_refused(
-    corners: np.ndarray[tuple[int, ...], np.dtype[np.float64]], support: float, reason: str | None
+    corners: FloatArray, support: float, reason: str | None
 ) -> None:
     outline = Quadrilateral(corners, np.tile(np.eye(2), (4, 1, 1)), side_lines(corners), np.array([1, 1, 1, support]))
     why_not = why_implausible(outline, corners, BOX, 0.35)

@@ -5,6 +5,8 @@ import json
 import numpy as np
 import pytest
 from drawn_ground import box_around, frame, lens, picture, view
+from tolerances import REFERENCE_GROUND_REL
+
 from standoff.core import homography
 from standoff.core.camera import Camera
 from standoff.core.classes import CLASS_BY_NAME
@@ -14,7 +16,6 @@ from standoff.core.types import Detections, GroundMap, ImageArray, NoGroundMap
 from standoff.stages.ground import ReferenceGround, ReferenceParams, ReferenceShape
 from standoff.stages.ground.params import ReferenceMethod
 from standoff.stages.ground.reference import AMBIGUOUS, IMPLAUSIBLE, LOST, NOT_SEEN, NOT_YET
-from tolerances import REFERENCE_GROUND_REL
 
 METHODS: tuple[ReferenceMethod, ...] = ("paper", "paper+tls", "oriented")
 FOOTING = ReferenceShape.square(2.89)
@@ -31,8 +32,8 @@ def detected(box: FloatArray, score: float = 0.9, name: str = "reference") -> De
 def seen(
     shape: ReferenceShape, tilt_deg: float = 35.0, yaw_deg: float = 20.0, camera: Camera = LENS, away_m: float = 12.0
 ) -> tuple[ImageArray, FloatArray, FloatArray]:
-    target = tuple((shape.corners_m.mean(axis=0) + [0.5, 0.3]).tolist())
-    ground_to_image = view(camera, (target[0], target[1]), away_m, tilt_deg, yaw_deg)
+    target_x, target_y = shape.corners_m.mean(axis=0).tolist()
+    ground_to_image = view(camera, (target_x + 0.5, target_y + 0.3), away_m, tilt_deg, yaw_deg)
     return (
         picture(ground_to_image, shape.corners_m, camera),
         ground_to_image,
@@ -76,7 +77,9 @@ def test_metres_are_recovered_around_the_reference(shape: ReferenceShape, yaw_de
 @pytest.mark.parametrize("method", METHODS)
 def test_every_method_maps_the_footing_of_the_paper(method: ReferenceMethod) -> None:
     gray, ground_to_image, box = seen(FOOTING)
-    ground = mapped(ReferenceGround(FOOTING, ReferenceParams(method=method), box_xyxy_px=box).update(frame(gray), NOTHING))
+    ground = mapped(
+        ReferenceGround(FOOTING, ReferenceParams(method=method), box_xyxy_px=box).update(frame(gray), NOTHING)
+    )
     limit = REFERENCE_GROUND_REL * (10.0 if method == "paper" else 2.0)
     assert np.abs(length_errors(ground, ground_to_image, FOOTING)).max() < limit
     np.testing.assert_allclose(ground.to_ground(ground.anchors_px)[0], FOOTING.corners_m, atol=1e-6)
@@ -114,7 +117,9 @@ def test_stated_errors_of_the_map_are_of_the_size_of_the_real_ones() -> None:
 def flight(count: int, yaw_step_deg: float) -> list[tuple[ImageArray, FloatArray]]:
     frames = []
     for k in range(count):
-        ground_to_image = view(LENS, (1.5 + 0.08 * k, 1.4 - 0.05 * k), 12.0 + 0.05 * k, 30.0 + 0.5 * k, yaw_step_deg * k)
+        ground_to_image = view(
+            LENS, (1.5 + 0.08 * k, 1.4 - 0.05 * k), 12.0 + 0.05 * k, 30.0 + 0.5 * k, yaw_step_deg * k
+        )
         frames.append((picture(ground_to_image, FOOTING.corners_m, LENS), ground_to_image))
     return frames
 
@@ -175,6 +180,44 @@ def test_a_second_reference_elsewhere_does_not_take_over() -> None:
     far = np.array([5.0, 5.0, 65.0, 65.0])
     both = Detections(np.stack([far, box]), np.array([0.99, 0.5]), np.full(2, CLASS_BY_NAME["reference"].id))
     np.testing.assert_allclose(mapped(stage.update(frame(gray, 0.1), both)).anchors_px, first.anchors_px, atol=0.3)
+
+
+def test_after_a_long_absence_the_site_frame_is_the_one_nearest_to_the_last_known() -> None:
+    before, after = seen(FOOTING, yaw_deg=20.0), seen(FOOTING, yaw_deg=50.0)
+    stage = ReferenceGround(FOOTING, camera=LENS)
+    post = np.array([[4.0, 3.0]])
+    first = mapped(stage.update(frame(before[0], 0.0), detected(before[2])))
+    expected = first.to_ground(homography.apply(before[1], post)[0])[0]
+    for time_s in (3.0, 6.0):
+        flat = np.full_like(before[0], 90)
+        assert reason(stage.update(frame(flat, time_s), NOTHING)) == LOST
+    ground = mapped(stage.update(frame(after[0], 9.0), detected(after[2])))
+    found = ground.to_ground(homography.apply(after[1], post)[0])[0]
+    np.testing.assert_allclose(found, expected, atol=0.08)
+
+
+def test_an_undetected_outline_keeps_being_followed_under_its_detections() -> None:
+    gray, ground_to_image, box = seen(QUADRILATERAL)
+    stage = ReferenceGround(QUADRILATERAL, camera=LENS)
+    mapped(stage.update(frame(gray, 0.0), detected(box)))
+    left, top, right, bottom = box.astype(int)
+    covered = gray.copy()
+    covered[top : (top + bottom) // 2, left - 12 : right + 12] = 90
+    for k in range(1, 4):
+        assert not stage.update(frame(covered, k / 10), detected(box))
+    ground = mapped(stage.update(frame(gray, 0.5), detected(box)))
+    found = ground.to_ground(homography.apply(ground_to_image, QUADRILATERAL.corners_m)[0])[0]
+    np.testing.assert_allclose(found, QUADRILATERAL.corners_m, atol=0.02)
+
+
+def test_a_hint_is_a_place_in_the_picture_as_the_lens_shows_it() -> None:
+    shape = ReferenceShape.square(6.0)
+    gray, ground_to_image, box = seen(shape, camera=WIDE)
+    corners_px = WIDE.distort(homography.apply(ground_to_image, shape.corners_m)[0])
+    for corner in range(4):
+        stage = ReferenceGround(shape, box_xyxy_px=box, first_corner_px=corners_px[corner], camera=WIDE)
+        ground = mapped(stage.update(frame(gray), NOTHING))
+        np.testing.assert_allclose(ground.anchors_px[0], corners_px[corner], atol=0.3)
 
 
 def test_a_shape_whose_corners_cannot_be_told_apart_is_not_guessed_at() -> None:
@@ -252,7 +295,9 @@ def test_eq_6_scale_is_metres_per_pixel_of_the_reference() -> None:
 
 
 def test_the_description_is_plain_and_says_what_was_configured() -> None:
-    stage = ReferenceGround(FOOTING, ReferenceParams(method="paper"), box_xyxy_px=(1, 2, 30, 40), first_corner_px=(2, 3))
+    stage = ReferenceGround(
+        FOOTING, ReferenceParams(method="paper"), box_xyxy_px=(1, 2, 30, 40), first_corner_px=(2, 3)
+    )
     record = json.loads(json.dumps(stage.description))
     assert record["params"]["method"] == "paper"
     assert record["box_xyxy_px"] == [1, 2, 30, 40]

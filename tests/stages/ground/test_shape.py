@@ -4,22 +4,24 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from standoff.core.errors import GroundError
-from standoff.stages.ground.shape import ReferenceShape
 from tolerances import GEOMETRY_REL
+
+from standoff.core.errors import GroundError
+from standoff.core.homography import FloatArray
+from standoff.stages.ground.shape import ReferenceShape
 
 radii = st.lists(st.floats(0.5, 5.0), min_size=4, max_size=4)
 jitters = st.lists(st.floats(-0.6, 0.6), min_size=4, max_size=4)
 
 
-def convex_corners(radius: list[float], jitter: list[float]) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+def convex_corners(radius: list[float], jitter: list[float]) -> FloatArray:
     angles = np.arange(4) * np.pi / 2 + np.array(jitter)
     corners = np.column_stack([np.cos(angles), np.sin(angles)]) * np.array(radius)[:, None]
     sides = np.roll(corners, -1, axis=0) - corners
     unit = sides / np.linalg.norm(sides, axis=1)[:, None]
     before = np.roll(unit, 1, axis=0)
     assume((before[:, 0] * unit[:, 1] - before[:, 1] * unit[:, 0] > 0.05).all())
-    return corners
+    return np.asarray(corners)
 
 
 @given(radii, jitters)
@@ -72,7 +74,9 @@ def test_only_turns_that_change_no_distance_count_as_symmetries(shape: Reference
         ([[0, 0], [1, 0], [1, 1], ["a", 1]], "'a'"),
     ],
 )
-def test_corners_that_make_no_convex_quadrilateral_are_refused_in_one_line(corners: list[list[float]], found: str) -> None:
+def test_corners_that_make_no_convex_quadrilateral_are_refused_in_one_line(
+    corners: list[list[float]], found: str
+) -> None:
     with pytest.raises(GroundError) as caught:
         ReferenceShape.from_corners(corners)
     assert found in str(caught.value)

@@ -126,7 +126,7 @@ class FakeSite:
         boxes = [self._box(place, class_id) for place, class_id in zip(xy, self.class_id.tolist(), strict=True)]
         lost = 2.4 <= time_s < 3.2
         ground = NoGroundMap("reference hidden & <not> found") if lost else self.ground(0.4 if index % 50 > 40 else 0.0)
-        observed = np.array([not (i == 3 and 3.6 <= time_s < 4.2) for i in self.track_id])
+        observed = np.array([not (i == 3 and 3.6 <= time_s < 4.2) for i in self.track_id], dtype=bool)
         tracks = Tracks(
             track_id=self.track_id,
             xyxy_px=np.array(boxes),
@@ -151,7 +151,7 @@ class FakeSite:
         )
 
     def _positions(self, time_s: float, xy: FloatArray, lost: bool) -> GroundPositions:
-        valid = np.array([not lost and not (i == 2 and 1.0 <= time_s < 1.6) for i in self.track_id])
+        valid = np.array([not lost and not (i == 2 and 1.0 <= time_s < 1.6) for i in self.track_id], dtype=bool)
         nan = ~valid
         step = (self.xy_m(time_s + 0.01) - xy) / 0.01
         covariance = np.tile(np.eye(2) * 0.2**2, (len(xy), 1, 1))

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-
 from stages.sinks.fake_site import FakeSite
+
 from standoff.core.types import Hazard, Outcome
 from standoff.stages.sinks import HazardSink, RecordSink
 from standoff.stages.sinks.durations import Durations

@@ -11,19 +11,51 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-
 from stages.sinks.fake_site import FakeSite
+
 from standoff.core.types import FrameResult, NoGroundMap, Outcome, Proximities, Tracks
 from standoff.stages.sinks import FRAMES, PROXIMITY, TRACKS, Table, TableParams, TableSink
 
-TRACK_COLUMNS = (
-    "stream_id frame time_s track_id class score x1_px y1_px x2_px y2_px observed age_s x_m y_m vx_mps vy_mps "
-    "sigma_x_m sigma_y_m cov_xy_m2 radius_m valid reason"
-).split()
-PROXIMITY_COLUMNS = (
-    "stream_id frame time_s track_a track_b class_a class_b distance_m gap_m sigma_m closing_mps "
-    "time_to_contact_s filtered measured"
-).split()
+TRACK_COLUMNS = [
+    "stream_id",
+    "frame",
+    "time_s",
+    "track_id",
+    "class",
+    "score",
+    "x1_px",
+    "y1_px",
+    "x2_px",
+    "y2_px",
+    "observed",
+    "age_s",
+    "x_m",
+    "y_m",
+    "vx_mps",
+    "vy_mps",
+    "sigma_x_m",
+    "sigma_y_m",
+    "cov_xy_m2",
+    "radius_m",
+    "valid",
+    "reason",
+]
+PROXIMITY_COLUMNS = [
+    "stream_id",
+    "frame",
+    "time_s",
+    "track_a",
+    "track_b",
+    "class_a",
+    "class_b",
+    "distance_m",
+    "gap_m",
+    "sigma_m",
+    "closing_mps",
+    "time_to_contact_s",
+    "filtered",
+    "measured",
+]
 
 
 @pytest.fixture(scope="module")

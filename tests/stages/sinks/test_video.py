@@ -6,8 +6,8 @@ from pathlib import Path
 import av
 import numpy as np
 import pytest
-
 from stages.sinks.fake_site import FakeSite
+
 from standoff.core.errors import MissingDependency
 from standoff.core.types import Outcome
 from standoff.stages.sinks import Composer, VideoParams, VideoSink
@@ -92,7 +92,7 @@ def test_an_odd_sized_source_is_written(tmp_path: Path) -> None:
 
 def test_without_any_encoder_the_reader_is_told_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("standoff.stages.sinks.encoder._ENCODERS", ("no_such_encoder",))
-    with pytest.raises(MissingDependency, match="no_such_encoder.*pip install"):
+    with pytest.raises(MissingDependency, match=r"no_such_encoder.*pip install"):
         available_encoder()
 
 

@@ -92,7 +92,7 @@ def follow(seen: Sequence[Detections]) -> list[Seen]:
 def follow_with_peer(seen: Sequence[Detections]) -> list[Seen]:
     params = TrackParams()
     peer = trackers.ByteTrackTracker(
-        lost_track_buffer=round(30 * params.max_coast_s),
+        lost_track_buffer=round(30 * params.max_lost_s),
         frame_rate=FRAMES_PER_S,
         track_activation_threshold=params.start_score,
         minimum_consecutive_frames=params.confirm_hits,

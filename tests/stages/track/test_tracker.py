@@ -69,16 +69,26 @@ def test_an_unsure_detection_starts_nothing() -> None:
     assert len(tracker.update(0.1, see(person(10), score=0.5))) == 0
 
 
-def test_a_track_coasts_marked_and_ends_in_seconds() -> None:
-    tracker = Tracker(TrackParams(max_coast_s=0.5))
-    for index in range(5):
-        tracker.update(index / 10, see(person(10 + 3 * index)))
-    for index in range(5, 10):
-        tracks = tracker.update(index / 10, Detections.empty())
-        assert tracks.track_id.tolist() == [1]
-        assert not tracks.observed.any()
-    assert len(tracker.update(1.0, Detections.empty())) == 0
-    assert tracker.update(1.1, see(person(43))).track_id.tolist() == []
+def test_a_missed_track_coasts_marked_then_is_silent_then_ends() -> None:
+    def misses(count: int) -> tuple[Tracker, list[int]]:
+        tracker = Tracker(TrackParams(max_coast_s=0.5, max_lost_s=1.0))
+        tracker.update(0.0, see(person(10)))
+        missed = [tracker.update(index / 10, Detections.empty()) for index in range(1, count + 1)]
+        assert not any(tracks.observed.any() for tracks in missed)
+        return tracker, [len(tracks) for tracks in missed]
+
+    tracker, reported = misses(9)
+    assert reported == [1] * 5 + [0] * 4
+    assert tracker.update(1.0, see(person(10))).track_id.tolist() == [1]
+    tracker, _ = misses(11)
+    tracker.update(1.2, see(person(10)))
+    assert tracker.update(1.3, see(person(10))).track_id.tolist() == [2]
+
+
+def test_a_track_is_kept_as_long_as_it_may_coast() -> None:
+    tracker = Tracker(TrackParams(max_coast_s=3.0, max_lost_s=1.0))
+    tracker.update(0.0, see(person(10)))
+    assert len(tracker.update(2.0, Detections.empty())) == 1
 
 
 def test_a_coasting_box_moves_on_at_the_velocity_seen() -> None:
@@ -89,12 +99,16 @@ def test_a_coasting_box_moves_on_at_the_velocity_seen() -> None:
     assert centres(tracker.coast(3.4)) - before == pytest.approx(np.array([[15.0, 0.0]]), abs=0.1)
 
 
-def test_a_resting_detector_ends_no_track_but_stale_ones_are_not_reported() -> None:
-    tracker = Tracker(TrackParams(max_coast_s=0.5))
-    tracker.update(0.0, see(person(10)))
-    assert not tracker.coast(0.4).observed.any()
-    assert len(tracker.coast(0.8)) == 0
-    assert tracker.update(0.9, see(person(11))).track_id.tolist() == [1]
+def test_a_rest_of_the_detector_is_not_a_miss() -> None:
+    tracker = Tracker(TrackParams(max_coast_s=0.5, max_lost_s=0.5))
+    tracker.update(0.0, see(person(10), person(200)))
+    for index in range(1, 20):
+        tracks = tracker.coast(index / 10)
+        assert tracks.track_id.tolist() == [1, 2]
+        assert not tracks.observed.any()
+    tracks = tracker.update(2.0, see(person(11)))
+    assert tracks.track_id.tolist() == [1]
+    assert tracks.observed.all()
 
 
 @settings(max_examples=30, deadline=None)
@@ -121,7 +135,7 @@ def test_speed_does_not_change_when_frames_are_dropped(seed: int, speed_px_s: fl
 
 
 def test_ids_are_never_used_again_not_even_after_a_reset() -> None:
-    tracker = Tracker(TrackParams(max_coast_s=0.0))
+    tracker = Tracker(TrackParams(max_coast_s=0.0, max_lost_s=0.0))
     seen: list[int] = []
     for stream in range(3):
         for index in range(6):

@@ -13,7 +13,7 @@ from typing import Any
 import av
 
 from standoff.core.errors import SourceError
-from standoff.stages.frames.pictures import AvPicture
+from standoff.stages.frames.pictures import AvPicture, Scaler
 from standoff.stages.frames.reader import TIME_ROUNDING_S, Shot, check_size
 
 _IMAGE_SUFFIXES = frozenset({".bmp", ".jpeg", ".jpg", ".png", ".tif", ".tiff", ".webp"})
@@ -56,7 +56,7 @@ def _list_images(folder: Path) -> list[Path]:
     return sorted(images, key=_natural_key)
 
 
-def _decode(path: Path) -> AvPicture:
+def _decode(path: Path, scaler: Scaler) -> AvPicture:
     """Decode one image by its content, whatever its name promises."""
     try:
         content = path.read_bytes()
@@ -73,7 +73,7 @@ def _decode(path: Path) -> AvPicture:
             found=f"{path.name}: {error}",
             fix="replace it, or take it out of the folder",
         ) from error
-    return AvPicture(frame, round(frame.rotation))
+    return AvPicture(frame, round(frame.rotation), scaler)
 
 
 class FolderReader:
@@ -100,8 +100,9 @@ class FolderReader:
                 fix="give the images a second (--fps)",
             )
         self._folder = folder
+        self._scaler = Scaler()
         self._paths = _list_images(folder)
-        first = _decode(self._paths[0])
+        first = _decode(self._paths[0], self._scaler)
         self.size_px = (first.width_px, first.height_px)
         self.total_frames: int | None = len(self._paths)
         self.rate_fps = fps
@@ -111,7 +112,7 @@ class FolderReader:
         first = max(0, math.ceil((start_s - TIME_ROUNDING_S) * self.rate_fps))
         for index in range(first, len(self._paths), every):
             path = self._paths[index]
-            picture = _decode(path)
+            picture = _decode(path, self._scaler)
             check_size(picture, self.size_px, path.name)
             yield Shot(index, index / self.rate_fps, picture, path.name)
 

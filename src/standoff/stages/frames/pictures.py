@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from threading import Lock
+
 import av
 import cv2
 import numpy as np
+from av.video.reformatter import VideoReformatter
 
 from standoff.core.types import ImageArray
 
@@ -35,21 +38,52 @@ def _gray_of(bgr: ImageArray) -> ImageArray:
     return gray
 
 
+class Scaler:
+    """Scale and convert decoded frames of one stream, keeping swscale's tables and threads from frame to frame.
+
+    Making them anew for each frame costs as much as the work itself. One frame at a time: it may be shared
+    between threads.
+    """
+
+    def __init__(self) -> None:
+        self._lock = Lock()
+        self._reformatters: dict[tuple[int, int], VideoReformatter] = {}
+
+    def bgr(self, frame: av.VideoFrame, width_px: int, height_px: int) -> ImageArray:
+        """Return (height_px, width_px, 3) uint8, blue first.
+
+        Shrinking averages over areas, so that nothing aliases; enlarging interpolates linearly.
+        """
+        shrinks = width_px * height_px < frame.width * frame.height
+        with self._lock:
+            reformatter = self._reformatters.setdefault((width_px, height_px), VideoReformatter())
+            scaled = reformatter.reformat(
+                frame,
+                width=width_px,
+                height=height_px,
+                format="bgr24",
+                interpolation="AREA" if shrinks else "BILINEAR",
+            )
+        return np.asarray(scaled.to_ndarray(), dtype=np.uint8)
+
+
 class AvPicture:
     """A decoded video frame, upright; valid for as long as it is kept, whatever the decoder does next.
 
     Args:
         frame: The decoded `av.VideoFrame`, never changed.
         rotation_deg: Counter-clockwise turn that makes it upright: 0, 90, -90, 180 or -180.
+        scaler: Shared by all pictures of a stream, to be quick.
     """
 
-    __slots__ = ("_bgr", "_frame", "_gray", "_rotation_deg")
+    __slots__ = ("_bgr", "_frame", "_gray", "_rotation_deg", "_scaler")
 
-    def __init__(self, frame: av.VideoFrame, rotation_deg: int = 0) -> None:
+    def __init__(self, frame: av.VideoFrame, rotation_deg: int = 0, scaler: Scaler | None = None) -> None:
         if rotation_deg and rotation_deg not in _TURNS:
             raise ValueError(f"rotation_deg must be 0, 90, -90, 180 or -180, not {rotation_deg}")
         self._frame = frame
         self._rotation_deg = rotation_deg
+        self._scaler = scaler or Scaler()
         self._bgr: ImageArray | None = None
         self._gray: ImageArray | None = None
 
@@ -75,7 +109,8 @@ class AvPicture:
     def bgr(self) -> ImageArray:
         """Return (H, W, 3) uint8, blue first, read-only; converted once and kept."""
         if self._bgr is None:
-            self._bgr = _read_only(self._upright(self._frame.to_ndarray(format="bgr24")))
+            pixels = self._scaler.bgr(self._frame, self._frame.width, self._frame.height)
+            self._bgr = _read_only(self._upright(pixels))
         return self._bgr
 
     def resized_bgr(self, width_px: int, height_px: int) -> ImageArray:
@@ -84,12 +119,10 @@ class AvPicture:
         Shrinking averages over areas, so that nothing aliases; enlarging interpolates linearly. At the
         picture's own size it equals `bgr()`.
         """
-        shrinks = width_px * height_px < self.width_px * self.height_px
+        if (width_px, height_px) == (self.width_px, self.height_px):
+            return self.bgr().copy()
         wide, high = (height_px, width_px) if self._lies_on_its_side() else (width_px, height_px)
-        scaled = self._frame.reformat(
-            width=wide, height=high, format="bgr24", interpolation="AREA" if shrinks else "BILINEAR"
-        )
-        return self._upright(scaled.to_ndarray())
+        return self._upright(self._scaler.bgr(self._frame, wide, high))
 
     def gray(self) -> ImageArray:
         """Return (H, W) uint8 luma, 0 black to 255 white, read-only; made once and kept.

@@ -109,7 +109,7 @@ class Source:
                 else f"{found}, to stop before {self._selection.stop_s} s",
                 fix=f"choose a start and a stop inside the source ({self._length()})",
             )
-        return (shot for shot in _until(stop_s, chain([first], shots)))
+        return _until(stop_s, chain([first], shots))
 
     def _length(self) -> str:
         total, rate = self._reader.total_frames, self._reader.rate_fps

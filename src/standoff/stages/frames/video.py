@@ -13,7 +13,7 @@ import av
 
 from standoff.core.errors import SourceError, SourceTruncated
 from standoff.stages.frames.container import Header, not_a_video, open_video
-from standoff.stages.frames.pictures import AvPicture
+from standoff.stages.frames.pictures import AvPicture, Scaler
 from standoff.stages.frames.reader import TIME_ROUNDING_S, Shot, check_size
 
 _UNDECODABLE_IN_A_ROW = 100
@@ -39,6 +39,7 @@ class VideoReader:
 
     def __init__(self, path: Path, fps: float | None) -> None:
         self._path, self._fps = path, fps
+        self._scaler = Scaler()
         self.corrupt_frames = 0
         self._discarded = 0  # by an edit list
         self._container, self._stream = open_video(path)
@@ -109,7 +110,7 @@ class VideoReader:
         first_index: int | None = None
         last_index, last_s, frame = -1, -math.inf, self._first
         for last_index, frame in self._numbered_from(start_s):
-            picture, label = AvPicture(frame, self._rotation_deg), f"frame {last_index}"
+            picture, label = AvPicture(frame, self._rotation_deg, self._scaler), f"frame {last_index}"
             check_size(picture, self.size_px, label)
             time_s = self._time_s(last_index, frame)
             if time_s <= last_s:

@@ -8,7 +8,7 @@ import numpy as np
 from standoff.core.homography import FloatArray
 from standoff.core.types import ImageArray, IntArray
 
-_MAX_POINTS = 150
+_MAX_POINTS = 80
 _MIN_POINTS = 8
 _MIN_INLIERS = 0.5
 _ROUND_TRIP_PX = 0.7
@@ -82,12 +82,13 @@ def moved_box(motion: FloatArray, box_xyxy_px: FloatArray) -> FloatArray:
 
 
 def _similarity(before: ImageArray, now: ImageArray, where_xyxy: IntArray) -> FloatArray | None:
-    mask = np.zeros_like(before)
     left, top, right, bottom = where_xyxy
-    mask[top:bottom, left:right] = 255
-    start = cv2.goodFeaturesToTrack(before, _MAX_POINTS, 0.01, 4, mask=mask)
+    if right <= left or bottom <= top:
+        return None
+    start = cv2.goodFeaturesToTrack(before[top:bottom, left:right], _MAX_POINTS, 0.01, 4)
     if start is None or len(start) < _MIN_POINTS:
         return None
+    start += np.array([left, top], dtype=np.float32)
     end, found, _ = cv2.calcOpticalFlowPyrLK(before, now, start, None)
     back, found_back, _ = cv2.calcOpticalFlowPyrLK(now, before, end, None)
     returned = np.linalg.norm(back - start, axis=2).ravel() <= _ROUND_TRIP_PX

@@ -146,12 +146,11 @@ def _first_believable(
     best = next((k for k in ranking if believable(corners[k])), None)
     if best is None:
         return NoGroundMap(NO_QUADRILATERAL)
-    for rival in ranking:
-        if score[rival] < _RIVAL_SCORE * score[best] or rival == best:
-            continue
-        apart = min(np.linalg.norm(np.roll(corners[rival], k, axis=0) - corners[best], axis=1).max() for k in range(4))
-        if apart > _RIVAL_APART_PX and believable(corners[rival]):
-            return NoGroundMap(RIVALS)
+    rivals = [k for k in ranking if k != best and score[k] >= _RIVAL_SCORE * score[best]]
+    orders = np.array([np.roll(np.arange(4), turn) for turn in range(4)])
+    apart = np.linalg.norm(corners[rivals][:, orders] - corners[best], axis=-1).max(axis=-1).min(axis=-1)
+    if any(believable(corners[k]) for k, distance in zip(rivals, apart, strict=True) if distance > _RIVAL_APART_PX):
+        return NoGroundMap(RIVALS)
     chosen: IntArray = walks[best]
     return chosen
 

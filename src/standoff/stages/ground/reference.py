@@ -18,7 +18,7 @@ from standoff.stages.ground.correspondence import camera_misfit_px, turn_from_be
 from standoff.stages.ground.follow import BoxFollower, moved_box
 from standoff.stages.ground.outline import OutlineFinder
 from standoff.stages.ground.params import ReferenceParams
-from standoff.stages.ground.quadrilateral import NO_QUADRILATERAL, Quadrilateral
+from standoff.stages.ground.quadrilateral import Quadrilateral
 from standoff.stages.ground.shape import ReferenceShape
 
 NOT_SEEN = "no detection of the reference"
@@ -123,8 +123,7 @@ class ReferenceGround:
         if isinstance(turn, NoGroundMap):
             return turn
         ground = self._map(outline, turn, frame.size_px)
-        if isinstance(ground, GroundMap):
-            self._remember(ground, np.roll(outline.corners_px, -turn, axis=0), frame.time_s, gray)
+        self._remember(ground, np.roll(outline.corners_px, -turn, axis=0), frame.time_s, gray)
         return ground
 
     def _finder_for(self, frame: Frame) -> OutlineFinder:
@@ -227,12 +226,9 @@ class ReferenceGround:
             return int(np.linalg.norm(corners_px - hint, axis=1).argmin())
         return None
 
-    def _map(self, outline: Quadrilateral, turn: int, size_px: tuple[int, int]) -> GroundMap | NoGroundMap:
+    def _map(self, outline: Quadrilateral, turn: int, size_px: tuple[int, int]) -> GroundMap:
         corners_px = np.roll(outline.corners_px, -turn, axis=0)
-        try:
-            matrix = homography.fit(corners_px, self._shape.corners_m)
-        except np.linalg.LinAlgError:
-            return NoGroundMap(NO_QUADRILATERAL)
+        matrix = homography.fit(corners_px, self._shape.corners_m)
         covariance_px2 = np.roll(outline.covariance_px2, -turn, axis=0)
         return GroundMap(
             image_to_ground=matrix,
@@ -266,7 +262,7 @@ def rectified_scale_m_per_px(corners_px: FloatArray, shape: ReferenceShape) -> f
         Paper, section 5.1, Eq. 6.
 
     >>> square_px = np.array([[0.0, 0.0], [0.0, 100.0], [100.0, 100.0], [100.0, 0.0]])
-    >>> rectified_scale_m_per_px(square_px, ReferenceShape.square(2.89))
+    >>> round(rectified_scale_m_per_px(square_px, ReferenceShape.square(2.89)), 6)
     0.0289
     """
     perimeter_px = float(np.linalg.norm(np.roll(corners_px, -1, axis=0) - corners_px, axis=1).sum())

@@ -7,6 +7,7 @@ apart, so that the two edges of a narrow plank do not add up to one line.
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 from numba import njit
 
 from standoff.core.homography import BoolArray, FloatArray
@@ -31,7 +32,7 @@ _MAX_TURN_COSINE = 0.98
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
 def _vote(
-    table: FloatArray, points: FloatArray, towards: IntArray, normals: FloatArray, weight: float
+    table: npt.NDArray[np.float32], points: FloatArray, towards: IntArray, normals: FloatArray, weight: float
 ) -> None:  # pragma: no cover
     """Add the points' votes to a (directions, offsets) table, each shared between the two nearest offsets."""
     steps = len(table)
@@ -67,9 +68,11 @@ def agreeing(
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
-def _refined(line: FloatArray, points: FloatArray, direction: FloatArray) -> FloatArray:  # pragma: no cover
+def _refined(
+    line: FloatArray, points: FloatArray, direction: FloatArray, free: BoolArray
+) -> FloatArray:  # pragma: no cover
     for _ in range(_FIT_ROUNDS):
-        near = agreeing(line, points, direction, _NEAR_PX, _AGREE_COSINE)
+        near = agreeing(line, points, direction, _NEAR_PX, _AGREE_COSINE) & free
         count = near.sum()
         if count < _MIN_VOTES:
             break
@@ -95,7 +98,7 @@ def candidate_lines(points: FloatArray, direction: FloatArray, count: int) -> Fl
     angles = np.arange(_STEPS) * (2.0 * np.pi / _STEPS)
     normals = np.column_stack([np.cos(angles), np.sin(angles)])
     towards = np.rint(np.arctan2(direction[:, 1], direction[:, 0]) * (_STEPS / (2.0 * np.pi))).astype(np.int64)
-    table = np.zeros((_STEPS, 2 * reach + 1))
+    table = np.zeros((_STEPS, 2 * reach + 1), dtype=np.float32)
     _vote(table, points, towards, normals, 1.0)
     free = np.ones(len(points), dtype=bool)
     lines = []
@@ -104,7 +107,7 @@ def candidate_lines(points: FloatArray, direction: FloatArray, count: int) -> Fl
         if table[row, column] < _MIN_VOTES:
             break
         coarse = np.array([*normals[row], float(reach - column)])
-        line = _refined(coarse, points[free], direction[free])
+        line = _refined(coarse, points, direction, free)
         lines.append(line)
         claimed = free & agreeing(line, points, direction, _CLAIM_PX, _CLAIM_COSINE)
         _vote(table, points[claimed], towards[claimed], normals, -1.0)

@@ -113,6 +113,7 @@ def plan_chart(summary: RunSummary) -> str:
             axes.imshow(background, extent=(low[0], high[0], low[1], high[1]), alpha=0.55, zorder=0)
         for path in paths:
             _plot_path(axes, path)
+        _name_paths(axes, paths, label_size_m=(high - low) * (0.11, 0.025))
         axes.set_xlim(low[0], high[0])
         axes.set_ylim(low[1], high[1])
         axes.set_aspect("equal")
@@ -175,7 +176,16 @@ def _plot_path(axes: Axes, path: Path) -> None:
     axes.plot(*points.T, color=colour, linewidth=1.7)
     axes.plot(*placed[0], marker="o", markersize=5, color=_SURFACE, markeredgecolor=colour, markeredgewidth=1.6)
     axes.plot(*placed[-1], marker="s", markersize=5.5, color=colour, markeredgecolor=_SURFACE)
-    axes.annotate(path.name, placed[-1], xytext=(6, 4), textcoords="offset points", fontsize=8)
+
+
+def _name_paths(axes: Axes, paths: list[Path], label_size_m: FloatArray) -> None:
+    """Write the names at the ends, those of the longest paths first, none over another."""
+    named: list[FloatArray] = []
+    for path in sorted(paths, key=len, reverse=True):
+        end = path.points_m[np.isfinite(path.points_m[:, 0])][-1]
+        if all((np.abs(end - other) > label_size_m).any() for other in named):
+            axes.annotate(path.name, end, xytext=(6, 4), textcoords="offset points", fontsize=8)
+            named.append(end)
 
 
 def _square_around(points_m: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from standoff.core.homography import FloatArray
 from standoff.core.types import GroundMap, ImageArray, NoGroundMap
-from standoff.stages.sinks.ground_shapes import GroundCircles
+from standoff.stages.sinks.ground_shapes import circle_outlines_px
 from standoff.stages.sinks.painter import Painter
 from standoff.stages.sinks.palette import Tone, bgr
 from standoff.stages.sinks.params import DrawParams
@@ -36,7 +36,6 @@ class Overlay:
     def __init__(self, params: DrawParams | None = None, text: TextSprites | None = None) -> None:
         self._params = params or DrawParams()
         self._text = text or TextSprites()
-        self._circles = GroundCircles()
 
     def draw(self, canvas: ImageArray, sketch: Sketch, region_px: FloatArray | None = None) -> None:
         """Draw over a picture, in place.
@@ -55,7 +54,7 @@ class Overlay:
         else:
             _draw_anchors(painter, to_canvas, scene.ground)
             if self._params.circles:
-                self._draw_circles(painter, to_canvas, sketch, scene.ground)
+                _draw_circles(painter, to_canvas, sketch, scene.ground)
         _draw_boxes(painter, to_canvas, sketch)
         _draw_lines(painter, to_canvas, sketch)
         _draw_status(painter, canvas, scene)
@@ -64,16 +63,6 @@ class Overlay:
         if self._params.labels:
             _label_lines(painter, to_canvas, sketch)
             _label_boxes(painter, to_canvas, sketch)
-
-    def _draw_circles(self, painter: Painter, to_canvas: _ToCanvas, sketch: Sketch, ground: GroundMap) -> None:
-        positions = sketch.scene.positions
-        outlines = self._circles.outlines_px(ground, positions.xy_m, positions.radius_m)
-        for runs, tone, observed in zip(outlines, sketch.tones, sketch.scene.tracks.observed, strict=True):
-            for run in runs:
-                outline = to_canvas(run)
-                if tone in ("danger", "warning"):
-                    painter.fill(outline, bgr(tone), 0.16)
-                painter.line(outline, bgr(tone), dashed=not observed)
 
 
 class _ToCanvas:
@@ -105,6 +94,17 @@ def _draw_anchors(painter: Painter, to_canvas: _ToCanvas, ground: GroundMap) -> 
         painter.cased_line(np.vstack([anchors, anchors[:1]]), bgr("reference"), dashed=ground.age_s > 0)
     for anchor in anchors:
         painter.dot(anchor, bgr("reference"), hollow=ground.age_s > 0)
+
+
+def _draw_circles(painter: Painter, to_canvas: _ToCanvas, sketch: Sketch, ground: GroundMap) -> None:
+    positions = sketch.scene.positions
+    outlines = circle_outlines_px(ground, positions.xy_m, positions.radius_m)
+    for runs, tone, observed in zip(outlines, sketch.tones, sketch.scene.tracks.observed, strict=True):
+        for run in runs:
+            outline = to_canvas(run)
+            if tone in ("danger", "warning"):
+                painter.fill(outline, bgr(tone), 0.16)
+            painter.line(outline, bgr(tone), dashed=not observed)
 
 
 def _draw_boxes(painter: Painter, to_canvas: _ToCanvas, sketch: Sketch) -> None:

@@ -5,13 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from standoff.core import homography
-from standoff.core.camera import Camera
-from standoff.core.homography import FloatArray
+from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import GroundMap
 
 _POINTS = 48  # a chord is within a quarter of a per cent of the radius
 _NEAREST_SHARE = 0.02  # of the centre's depth: what is cut away lies far outside the picture
-_LENS_MARGIN = 1.05
 
 
 def clip_in_front(target_to_source: FloatArray, polygon: FloatArray, nearest: float) -> FloatArray:
@@ -47,56 +45,34 @@ def clip_in_front(target_to_source: FloatArray, polygon: FloatArray, nearest: fl
     return np.array(kept, dtype=np.float64).reshape(-1, 2)
 
 
-def lens_reach_px(camera: Camera) -> float:
-    """Return how far from the principal point, undistorted, the lens model still describes the picture.
+def circle_outlines_px(ground: GroundMap, centres_m: FloatArray, radii_m: FloatArray) -> list[list[FloatArray]]:
+    """Project circles on the ground into the picture.
 
-    A distortion polynomial folds back beyond that: a point far outside would reappear inside the picture.
+    Args:
+        ground: The map.
+        centres_m: (N, 2) site frame; NaN for an unknown position.
+        radii_m: (N,).
+
+    Returns:
+        For each circle the open polylines, (P, 2) picture points, that make up its outline: one that ends where
+        it starts for a whole ellipse, none for an unknown position, behind the camera or where no lens sees.
     """
-    x, y = np.meshgrid(np.linspace(0, camera.width_px - 1, 9), np.linspace(0, camera.height_px - 1, 9))
-    undistorted = camera.undistort(np.column_stack([x.ravel(), y.ravel()]))
-    return float(np.nanmax(np.linalg.norm(undistorted - camera.matrix[:2, 2], axis=1)))
+    ground_to_image = homography.invert(ground.image_to_ground)
+    angles = np.linspace(0.0, 2.0 * np.pi, _POINTS, endpoint=False)
+    ring = np.column_stack([np.cos(angles), np.sin(angles)])
+    depths = centres_m @ ground_to_image[2, :2] + ground_to_image[2, 2]
+    outlines: list[list[FloatArray]] = []
+    for centre, radius, depth in zip(centres_m, radii_m, depths, strict=True):
+        if not depth > 0:
+            outlines.append([])
+            continue
+        polygon = clip_in_front(ground_to_image, centre + radius * ring, _NEAREST_SHARE * depth)
+        points, _ = homography.apply(ground_to_image, np.vstack([polygon, polygon[:1]]))
+        outlines.append([points] if ground.camera is None else _finite_runs(ground.camera.distort(points)))
+    return outlines
 
 
-class GroundCircles:
-    """Draw circles on the ground into a picture; keeps what it found out about the lens."""
-
-    def __init__(self) -> None:
-        self._camera: Camera | None = None
-        self._reach_px = np.inf
-
-    def outlines_px(self, ground: GroundMap, centres_m: FloatArray, radii_m: FloatArray) -> list[list[FloatArray]]:
-        """Project circles on the ground.
-
-        Args:
-            ground: The map.
-            centres_m: (N, 2) site frame; NaN for an unknown position.
-            radii_m: (N,).
-
-        Returns:
-            For each circle the open polylines, (P, 2) picture points, that make up its outline: one that ends
-            where it starts for a whole ellipse, none for an unknown position or one behind the camera.
-        """
-        if ground.camera is not self._camera:
-            self._camera = ground.camera
-            self._reach_px = _LENS_MARGIN * lens_reach_px(ground.camera) if ground.camera else np.inf
-        ground_to_image = homography.invert(ground.image_to_ground)
-        angles = np.linspace(0.0, 2.0 * np.pi, _POINTS, endpoint=False)
-        ring = np.column_stack([np.cos(angles), np.sin(angles)])
-        depths = centres_m @ ground_to_image[2, :2] + ground_to_image[2, 2]
-        outlines: list[list[FloatArray]] = []
-        for centre, radius, depth in zip(centres_m, radii_m, depths, strict=True):
-            if not depth > 0:
-                outlines.append([])
-                continue
-            polygon = clip_in_front(ground_to_image, centre + radius * ring, _NEAREST_SHARE * depth)
-            points, _ = homography.apply(ground_to_image, np.vstack([polygon, polygon[:1]]))
-            outlines.append(self._through_lens(points))
-        return outlines
-
-    def _through_lens(self, undistorted_px: FloatArray) -> list[FloatArray]:
-        if self._camera is None:
-            return [undistorted_px]
-        inside = np.linalg.norm(undistorted_px - self._camera.matrix[:2, 2], axis=1) <= self._reach_px
-        starts = np.flatnonzero(np.diff(inside, prepend=False)) if not inside.all() else np.array([0])
-        runs = np.split(np.arange(len(inside)), starts)
-        return [self._camera.distort(undistorted_px[run]) for run in runs if len(run) > 1 and inside[run[0]]]
+def _finite_runs(points_px: FloatArray) -> list[FloatArray]:
+    seen: BoolArray = np.asarray(np.isfinite(points_px).all(axis=1))
+    runs = np.split(np.arange(len(seen)), np.flatnonzero(np.diff(seen)) + 1)
+    return [points_px[run] for run in runs if len(run) > 1 and seen[run[0]]]

@@ -9,11 +9,12 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from standoff.core import homography
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import GroundMap, ImageArray
-from standoff.stages.sinks.ground_shapes import clip_in_front, lens_reach_px
+from standoff.stages.sinks.ground_shapes import clip_in_front
 
 _GRID = 24
 _LENS_STEP_PX = 16
@@ -114,60 +115,59 @@ def rectify(picture: ImageArray, ground: GroundMap, window: GroundWindow, onto: 
     Source:
         Paper, section 5.1, Eq. 5.
     """
-    window_to_image = homography.invert(ground.image_to_ground) @ homography.invert(window.ground_to_window)
+    window_to_ground = homography.invert(window.ground_to_window)
+    window_to_image = homography.invert(ground.image_to_ground) @ window_to_ground
     factor = np.array(picture.shape[1::-1]) / ground.image_size_px
-    to_picture = np.diag([*factor, 1.0])
-    to_picture[:2, 2] = (factor - 1.0) / 2.0
-    behind = _behind_camera(window_to_image, window)
-    background = onto.copy() if behind.any() else onto
+    image_to_picture = np.diag([*factor, 1.0])
+    image_to_picture[:2, 2] = (factor - 1.0) / 2.0
+    behind = _behind_camera(window_to_image, window.size_px)
+    backdrop = onto if behind is None else onto.copy()
     if ground.camera is None:
-        flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
         cv2.warpPerspective(
             picture,
-            to_picture @ window_to_image,
+            image_to_picture @ window_to_image,
             window.size_px,
             dst=onto,
-            flags=flags,
+            flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
             borderMode=cv2.BORDER_TRANSPARENT,
         )
     else:
-        _remap_through_lens(picture, ground, window_to_image, to_picture, onto)
-    if behind.any():
-        onto[behind] = background[behind]
+        x_px, y_px = _picture_points(ground, window_to_ground, image_to_picture, onto.shape[:2])
+        cv2.remap(picture, x_px, y_px, cv2.INTER_LINEAR, dst=onto, borderMode=cv2.BORDER_TRANSPARENT)
+    if behind is not None:
+        onto[behind] = backdrop[behind]
 
 
-def _behind_camera(window_to_image: FloatArray, window: GroundWindow) -> BoolArray:
-    """Return (h, w) what lies behind the camera's own plane; (0, 0) when the whole window is in front."""
-    width, height = window.size_px
+def _behind_camera(window_to_image: FloatArray, size_px: tuple[int, int]) -> BoolArray | None:
+    """Return (h, w) what lies behind the camera's own plane, None when the whole window is in front of it."""
+    width, height = size_px
     corners = np.array([[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]])
-    nearest = 1e-6 * float(np.abs(corners @ window_to_image[2, :2] + window_to_image[2, 2]).max())
-    front = clip_in_front(window_to_image, corners, nearest)
-    if front is corners:
-        return np.zeros((0, 0), dtype=bool)
+    depths = corners @ window_to_image[2, :2] + window_to_image[2, 2]
+    if (depths > 0).all():
+        return None
+    front = clip_in_front(window_to_image, corners, 1e-6 * float(np.abs(depths).max()))
     mask = np.ones((height, width), dtype=np.uint8)
     if len(front):
         cv2.fillPoly(mask, [np.round(front).astype(np.int32)], 0)
     return mask.astype(bool)
 
 
-def _remap_through_lens(
-    picture: ImageArray, ground: GroundMap, window_to_image: FloatArray, to_picture: FloatArray, onto: ImageArray
-) -> None:
-    """Distort a coarse grid of points only; between them the lens is as good as linear for the eye."""
-    camera = ground.camera
-    assert camera is not None
-    height, width = onto.shape[:2]
+def _picture_points(
+    ground: GroundMap, window_to_ground: FloatArray, image_to_picture: FloatArray, shape: tuple[int, ...]
+) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
+    """Return x and y, (h, w) each, of where every window pixel lies in the picture.
+
+    Only a coarse grid goes through the lens; between its points the lens is as good as linear for the eye.
+    """
+    height, width = shape
     columns, rows = -(-width // _LENS_STEP_PX) + 1, -(-height // _LENS_STEP_PX) + 1
     x, y = np.meshgrid(np.arange(columns) * _LENS_STEP_PX, np.arange(rows) * _LENS_STEP_PX)
-    points, valid = homography.apply(window_to_image, np.column_stack([x.ravel(), y.ravel()]))
-    with np.errstate(invalid="ignore"):
-        valid &= np.linalg.norm(points - camera.matrix[:2, 2], axis=1) <= 1.05 * lens_reach_px(camera)
-    points[~valid] = 0.0
-    at, _ = homography.apply(to_picture, camera.distort(points))
-    grid = np.column_stack([at, valid]).reshape(rows, columns, 3).astype(np.float32)
+    at_image_px, seen = ground.to_image(homography.apply(window_to_ground, np.column_stack([x.ravel(), y.ravel()]))[0])
+    at_image_px[~seen] = 0.0
+    at_px, _ = homography.apply(image_to_picture, at_image_px)
+    grid = np.column_stack([at_px, seen]).reshape(rows, columns, 3).astype(np.float32)
     # warpAffine with the step as scale keeps grid points on their pixels; cv2.resize would shift them by half a step.
     scale = np.array([[_LENS_STEP_PX, 0.0, 0.0], [0.0, _LENS_STEP_PX, 0.0]])
     dense = cv2.warpAffine(grid, scale, (width, height), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     dense[dense[:, :, 2] < 1.0] = _OUTSIDE_PX
-    x_px, y_px = np.ascontiguousarray(dense[:, :, 0]), np.ascontiguousarray(dense[:, :, 1])
-    cv2.remap(picture, x_px, y_px, cv2.INTER_LINEAR, dst=onto, borderMode=cv2.BORDER_TRANSPARENT)
+    return np.ascontiguousarray(dense[:, :, 0]), np.ascontiguousarray(dense[:, :, 1])

@@ -113,7 +113,12 @@ def _percent(share: float) -> str:
 
 
 def _metres(value_m: float) -> str:
-    return f"{value_m:.1f} m" if math.isfinite(value_m) else "unknown"
+    """Return a length for people.
+
+    >>> _metres(-0.04), _metres(2.26), _metres(float("nan"))
+    ('0.0 m', '2.3 m', 'unknown')
+    """
+    return f"{round(value_m, 1) + 0.0:.1f} m" if math.isfinite(value_m) else "unknown"
 
 
 def _flat(value: Any, prefix: str = "") -> Iterator[tuple[str, str]]:  # noqa: ANN401

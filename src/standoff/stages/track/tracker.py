@@ -39,11 +39,14 @@ class Tracker:
     half-hidden person is still a person where one was just seen (ByteTrack). Beyond ByteTrack, a track
     leaves a sure detection alone that fits it less well than an unsure one, which keeps it from jumping
     to a neighbour while its own person is half hidden, and unsure detections alone carry it for
-    `max_unsure_s` only, so that clutter does not keep a ghost alive. A track is reported
-    once it is confirmed, coasts on its predicted box while nothing supports it, and ends when it was
-    not seen for `max_coast_s` and the detector looks again without finding it. Persons continue as
-    persons, machines as machines; among machines the class may flicker, and the track's class is the
-    one with the largest sum of scores so far. Reference objects are not tracked.
+    `max_unsure_s` only, so that clutter does not keep a ghost alive.
+
+    A track is reported once it is confirmed, and coasts on its predicted box, marked as not observed,
+    while the detector rests and for `max_coast_s` of misses. Missed for longer it is silent but not
+    forgotten; after `max_lost_s` it ends.
+
+    Persons continue as persons, machines as machines; among machines the class may flicker, and the
+    track's class is the one with the largest sum of scores so far. Reference objects are not tracked.
 
     Times are presentation timestamps in seconds; the steps between them may vary, and may be zero.
 
@@ -101,7 +104,7 @@ class Tracker:
     def coast(self, time_s: float) -> Tracks:
         """Predict all tracks to a frame on which the detector rested.
 
-        No track ends here, since nobody looked; those not seen for `max_coast_s` are not reported.
+        Nobody looked, so no track ends and none is dropped from the report: a rest is not a miss.
 
         Args:
             time_s: Presentation timestamp, not before the previous one.
@@ -185,7 +188,8 @@ class Tracker:
     def _end_lost(self) -> None:
         unseen_s = self._time_s - self._rows["seen_s"]
         unsure_s = self._time_s - self._rows["sure_s"]
-        patience_s = np.where(self._rows["confirmed"], self._params.max_coast_s, 0.0) + _TIME_ROUNDING_S
+        longest_s = max(self._params.max_lost_s, self._params.max_coast_s)
+        patience_s = np.where(self._rows["confirmed"], longest_s, 0.0) + _TIME_ROUNDING_S
         self._rows = self._rows[(unseen_s <= patience_s) & (unsure_s <= self._params.max_unsure_s + _TIME_ROUNDING_S)]
 
     def _start(self, detections: Detections) -> None:
@@ -209,8 +213,8 @@ class Tracker:
         return class_id
 
     def _report(self, *, rested: bool = False) -> Tracks:
-        unseen_s = self._time_s - self._rows["seen_s"]
-        rows = self._rows[self._rows["confirmed"] & (unseen_s <= self._params.max_coast_s + _TIME_ROUNDING_S)]
+        overdue_s = self._looked_s - self._rows["seen_s"]
+        rows = self._rows[self._rows["confirmed"] & (overdue_s <= self._params.max_coast_s + _TIME_ROUNDING_S)]
         return Tracks(
             track_id=rows["track_id"],
             xyxy_px=motion.to_edges(rows["box"]),
