@@ -91,7 +91,9 @@ def build_sinks(settings: Settings, folder: Path, frames: Source, descriptions: 
         "frames": lambda: TableSink(folder / "frames.parquet", FRAMES, settings.tables),
         "hazards": lambda: HazardSink(folder / "hazards.jsonl"),
         "video": lambda: VideoSink(folder / "annotated.mp4", settings.video),
-        "report": lambda: ReportSink(folder / "report.html", settings.report, descriptions),
+        "report": lambda: ReportSink(
+            folder / "report.html", settings.report, descriptions, warning_gap_m=settings.hazard.buffer_m
+        ),
     }
     sinks: dict[str, Sink] = {name: makers[name]() for name in settings.outputs}
     for name, replacement in settings.extra_outputs.items():

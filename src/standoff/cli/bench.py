@@ -37,7 +37,7 @@ def bench(
     if str(json_file) == "-":
         return
     machine = report.machine
-    where = f"{machine['cpu']}, {machine['cores']} cores"
+    where = f"{machine['processor']}, {machine['cores']} cores"
     runs = {f"stages on {source.name}": report.stages}
     runs |= {f"made-up site, 1080p, ten tracks, {kind} ground": times for kind, times in report.workload.items()}
     for title, times in runs.items():

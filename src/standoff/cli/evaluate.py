@@ -63,6 +63,9 @@ def positions(
     run_folder: Annotated[Path, typer.Argument(help="Output folder of `standoff run`.", show_default=False)],
     truth: Annotated[Path, typer.Option(help="CSV: frame,id,x,y,w,h,conf,X,Y,Z; frames from 1.", show_default=False)],
     frames: Annotated[str | None, typer.Option(help="Score these truth frames only, FIRST-LAST.")] = None,
+    min_overlap: Annotated[
+        float, typer.Option(min=0, max=1, help="Smallest IoU of a track's box with a true one.")
+    ] = 0.5,
     pairs_up_to: Annotated[
         float, typer.Option(min=0, help="Score pairs that are truly this close or closer; m.")
     ] = 15.0,
@@ -70,14 +73,50 @@ def positions(
 ) -> None:
     """Compare a run's tracks and distances with truth: recall, position error, pair distance error."""
     from standoff.cli.console import print_table, write_json
-    from standoff.evaluation.positions import evaluate_positions
+    from standoff.evaluation.positions import NOTE, evaluate_positions
 
-    result = evaluate_positions(run_folder, truth, frames=_frame_range(frames), pairs_up_to_m=pairs_up_to)
+    result = evaluate_positions(
+        run_folder, truth, frames=_frame_range(frames), pairs_up_to_m=pairs_up_to, min_overlap=min_overlap
+    )
     if json_file is not None:
         write_json(result.to_dict(), json_file)
     if str(json_file) != "-":
-        rows = [(name, "" if value is None else f"{value:.4g}") for name, value in result.to_dict().items()]
-        print_table("Positions and distances against truth", ("figure", "value"), rows)
+        figures = result.to_dict()
+        rows = [
+            (name, _figure(figures[name]), _figure(figures.get(f"observed_{name}")))
+            for name in figures
+            if not name.startswith("observed_")
+        ]
+        print_table("Positions and distances against truth", ("figure", "all tracks", "without coasting"), rows, NOTE)
+
+
+@app.command()
+def rectification(
+    scenes: Annotated[int, typer.Option(min=1, help="Drawn quadrilaterals of each difficulty.")] = 300,
+    seed: Annotated[int, typer.Option(min=0, help="Of the drawings.")] = 0,
+    json_file: _Json = None,
+) -> None:
+    """Find drawn quadrilaterals with known corners by every method: failures, corner errors, time."""
+    from standoff.cli.console import print_table, write_json
+    from standoff.evaluation.rectification import evaluate_rectification
+
+    result = evaluate_rectification(scenes, seed)
+    if json_file is not None:
+        write_json(result.to_dict(), json_file)
+    if str(json_file) == "-":
+        return
+    rows = [
+        (score.method, score.difficulty, f"{score.failed_percent:.1f}", f"{score.wrong_percent:.1f}",
+         f"{score.corner_rmse_px:.3f}", f"{score.error_per_sigma:.2f}", f"{score.median_ms:.2f}")
+        for score in result.scores
+    ]  # fmt: skip
+    columns = ("method", "difficulty", "failed %", "of these wrong %", "corner rmse px", "error / sigma", "median ms")
+    caption = f"RANSAC: {result.speed_up:.0f} times as fast as the same algorithm as a Python loop in this run."
+    print_table(f"{scenes} drawn quadrilaterals of each difficulty", columns, rows, caption, texts=2)
+
+
+def _figure(value: float | None) -> str:
+    return "" if value is None else f"{value:.4g}"
 
 
 def _frame_range(text: str | None) -> tuple[int, int] | None:

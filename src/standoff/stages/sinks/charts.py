@@ -169,8 +169,6 @@ def _finish_time_axis(axes: Axes, summary: RunSummary) -> None:
 def _plot_path(axes: Axes, path: Path) -> None:
     points = path.points_m
     placed = points[np.isfinite(points[:, 0])]
-    if not len(placed):
-        return
     colour = HEX[class_tone(path.class_id)]
     axes.plot(*points.T, color=_SURFACE, linewidth=3.2, alpha=0.7)
     axes.plot(*points.T, color=colour, linewidth=1.7)
