@@ -61,3 +61,8 @@ EDGE_PX = 0.03
 
 REFERENCE_GROUND_REL = 0.005
 """Lengths of the reference's size, measured with it: corners good to 0.05-0.1 px of 100 px sides, on two sides."""
+
+DRAWN_SITE_M = {"paper": 0.8, "paper+tls": 0.3, "oriented": 0.2}
+"""Root mean square error of distances of about 10 m through a square of 2.89 m that is 100 px wide: a corner error of
+half a pixel is 1.5 cm on the square and grows with the square of the distance from it. Measured over three seeds: 0.51,
+0.17 and 0.12 m at the worst."""

@@ -9,7 +9,7 @@ import sys
 import pytest
 
 PUBLIC_NAMES = {
-    "standoff.stages.frames": {"ArrayPicture", "AvPicture", "Source", "frame_from_array", "open_source"},
+    "standoff.stages.frames": {"ArrayPicture", "AvPicture", "Scaler", "Source", "frame_from_array", "open_source"},
     "standoff.stages.detect": {"DEFAULT_CLASS_MAP", "DetectParams", "OnnxDetector", "available_providers"},
     "standoff.stages.track": {"TrackParams", "Tracker"},
     "standoff.stages.locate": {"LocateParams", "Locator"},
