@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
+
 from standoff.core.types import Detections, Frame
 
 
@@ -25,7 +27,7 @@ class ScriptedBoxes:
         if not rows:
             return Detections.empty()
         return Detections(
-            xyxy_px=[row["xyxy_px"] for row in rows],
-            score=[1.0] * len(rows),
-            class_id=[row["class_id"] for row in rows],
+            xyxy_px=np.array([row["xyxy_px"] for row in rows]),
+            score=np.ones(len(rows)),
+            class_id=np.array([row["class_id"] for row in rows]),
         )

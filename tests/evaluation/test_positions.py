@@ -76,7 +76,7 @@ def make_pairs(tracks: Columns, sigma_m: float = 0.1) -> dict[str, Any]:
 
 
 def score(truth: Columns, tracks: Columns, **options: Any) -> PositionsResult:
-    return score_positions(tracks, make_pairs(tracks), truth, **options)
+    return score_positions(tracks, make_pairs(tracks), truth, **({"min_overlap": 0.5} | options))
 
 
 def write_run(folder: Path, tracks: dict[str, Any], pairs: dict[str, Any]) -> None:
@@ -205,7 +205,7 @@ def test_a_pair_that_was_not_measured_is_missing_not_zero() -> None:
     pairs = make_pairs(tracks)
     pairs["measured"] = pairs["frame"] != 0
     pairs["distance_m"] = np.where(pairs["measured"], pairs["distance_m"], np.nan)
-    result = score_positions(tracks, pairs, truth)
+    result = score_positions(tracks, pairs, truth, min_overlap=0.5)
     assert result.pairs.pairs == 3 * (FRAMES - 1)
     assert result.pairs.pairs_share == pytest.approx((FRAMES - 1) / FRAMES)
     assert result.pairs.made_m == 0.0
@@ -217,7 +217,7 @@ def test_a_run_without_a_map_measures_nothing_and_says_so() -> None:
     pairs = make_pairs(tracks)
     pairs["measured"] = np.zeros_like(pairs["measured"])
     tracks["x_m"] = tracks["y_m"] = np.full(len(truth["frame"]), np.nan)
-    result = score_positions(tracks, pairs, truth)
+    result = score_positions(tracks, pairs, truth, min_overlap=0.5)
     assert result.entities.recall == 1.0
     assert (result.entities.located, result.pairs.pairs, result.pairs.pairs_share) == (0, 0, 0.0)
     assert result.to_dict()["made_m"] is None
@@ -229,7 +229,7 @@ def test_distances_come_from_the_proximity_table_not_from_positions() -> None:
     tracks = make_tracks(truth)
     pairs = make_pairs(tracks)
     pairs["distance_m"] = pairs["distance_m"] + 0.25
-    result = score_positions(tracks, pairs, truth)
+    result = score_positions(tracks, pairs, truth, min_overlap=0.5)
     assert result.pairs.made_m == pytest.approx(0.25)
     assert result.pairs.median_signed_error_m == pytest.approx(0.25)
     assert result.pairs.within_2_sigma == 0.0
@@ -258,16 +258,26 @@ def test_tracks_in_a_chosen_frame_without_labels_are_wrong() -> None:
     assert score(truth, tracks).entities.precision == 1.0
 
 
-def test_truth_without_boxes_is_matched_on_the_ground() -> None:
+def test_without_an_overlap_tracks_are_matched_where_they_stand() -> None:
     truth = dict(make_truth())
     near = make_tracks(truth, np.full((len(truth["frame"]), 2), 1.0))
     for name in ("x", "y", "w", "h"):
         truth[name] = np.full(len(truth["frame"]), np.nan)
-    assert score(truth, near).entities.recall == 1.0
+    assert score(truth, near, min_overlap=None).entities.recall == 1.0
     far = {**near, "x_m": near["x_m"] + 1000.0}
-    assert score(truth, far).entities.recall == 0.0
+    assert score(truth, far, min_overlap=None).entities.recall == 0.0
     nowhere = {**near, "x_m": np.full(len(near["frame"]), np.nan)}
-    assert score_positions(nowhere, make_pairs(near), truth).entities.recall == 0.0
+    entities = score_positions(nowhere, make_pairs(near), truth).entities
+    assert (entities.recall, entities.tracks) == (0.0, 0)
+
+
+def test_boxes_cannot_be_matched_with_truth_that_has_none() -> None:
+    truth = dict(make_truth())
+    tracks = make_tracks(truth)
+    for name in ("x", "y", "w", "h"):
+        truth[name] = np.full(len(truth["frame"]), np.nan)
+    with pytest.raises(DataError, match="expected truth with boxes"):
+        score(truth, tracks)
 
 
 def test_nobody_tracked_is_a_result() -> None:

@@ -64,8 +64,8 @@ def positions(
     truth: Annotated[Path, typer.Option(help="CSV: frame,id,x,y,w,h,conf,X,Y,Z; frames from 1.", show_default=False)],
     frames: Annotated[str | None, typer.Option(help="Score these truth frames only, FIRST-LAST.")] = None,
     min_overlap: Annotated[
-        float, typer.Option(min=0, max=1, help="Smallest IoU of a track's box with a true one.")
-    ] = 0.5,
+        float | None, typer.Option(min=0, max=1, help="Match by boxes of at least this IoU instead of on the ground.")
+    ] = None,
     pairs_up_to: Annotated[
         float, typer.Option(min=0, help="Score pairs that are truly this close or closer; m.")
     ] = 15.0,

@@ -4,11 +4,16 @@ Truth is a CSV file with the columns `frame,id,x,y,w,h,conf,X,Y` (MOTChallenge's
 pixels, X and Y in metres on the ground. Truth frame n is the run's frame index n - 1. Truth with conf 0 is not scored:
 neither it nor the tracks matched to it count for or against the run.
 
-In each frame, tracks are matched one to one with truth: by box overlap (IoU at least 0.5) where the truth has boxes,
-else by distance on the ground (at most 2 m). Everything is scored twice: as reported, coasting tracks included,
-because that is what people see; and without the coasting ones. Distances are those of `proximity.parquet`, after the
-outlier filter: what the run claims, not what could be computed again from its positions. Truth that no track covers
-is missed, and a true pair without a measured distance is missing from `pairs_share`: nothing is dropped silently.
+In each frame, tracks are matched one to one with truth: on the ground, where both stand at most 2 m apart, which is a
+worker's own action radius (paper, Table 6); or, when a smallest overlap is given, by their boxes. The first rule asks
+whether the run knows that somebody is there; it leaves out position errors above 2 m, which count as a miss and a false
+alarm instead. The second also asks for a tight box, and keeps position errors of any size. A track without a position
+claims nothing on the ground: the first rule leaves it out.
+
+Everything is scored twice: as reported, coasting tracks included, because that is what people see; and without the
+coasting ones. Distances are those of `proximity.parquet`, after the outlier filter: what the run claims, not what could
+be computed again from its positions. Truth that no track covers is missed, and a true pair without a measured distance
+is missing from `pairs_share`: nothing is dropped silently.
 
 Precision is a lower bound wherever not everybody is labelled: a track on somebody without a label counts as wrong.
 """
@@ -104,7 +109,7 @@ class PositionsResult:
         frames: Number of scored frames.
         frames_without_tracks: Of these, those in which the run reports nobody; their truth is missed.
         pairs_up_to_m: Largest true distance of a scored pair.
-        min_overlap: Smallest IoU of a match.
+        min_overlap: Smallest IoU of a match; None: matched on the ground.
         entities: With all reported tracks.
         pairs: The same.
         observed_entities: Without tracks that coast.
@@ -116,7 +121,7 @@ class PositionsResult:
     frames: int
     frames_without_tracks: int
     pairs_up_to_m: float
-    min_overlap: float
+    min_overlap: float | None
     entities: EntityScore
     pairs: PairScore
     observed_entities: EntityScore
@@ -129,7 +134,7 @@ class PositionsResult:
         figures |= {f"observed_{name}": value for name, value in observed.items()}
         for name in ("first_frame", "last_frame", "frames", "frames_without_tracks", "pairs_up_to_m", "min_overlap"):
             figures[name] = getattr(self, name)
-        return {name: value if np.isfinite(value) else None for name, value in figures.items()}
+        return {name: None if value is None or np.isnan(value) else value for name, value in figures.items()}
 
 
 def evaluate_positions(
@@ -138,7 +143,7 @@ def evaluate_positions(
     *,
     frames: tuple[int, int] | None = None,
     pairs_up_to_m: float = 15.0,
-    min_overlap: float = 0.5,
+    min_overlap: float | None = None,
     class_name: str = "worker",
 ) -> PositionsResult:
     """Compare a run's tables with a truth file.
@@ -148,7 +153,7 @@ def evaluate_positions(
         truth_file: CSV as at this module's head.
         frames: First and last truth frame, from 1, completely labelled between; None: the frames that have labels.
         pairs_up_to_m: Pairs that are truly further apart are not scored.
-        min_overlap: Smallest IoU of a track's box with the true one; unused where the truth has no boxes.
+        min_overlap: Smallest IoU of a track's box with the true one; None: match on the ground.
         class_name: What the truth shows; tracks of other classes are left out.
 
     Raises:
@@ -169,7 +174,7 @@ def score_positions(
     *,
     frames: tuple[int, int] | None = None,
     pairs_up_to_m: float = 15.0,
-    min_overlap: float = 0.5,
+    min_overlap: float | None = None,
 ) -> PositionsResult:
     """Compare tracks and distances with truth, given as columns.
 
@@ -190,6 +195,10 @@ def score_positions(
         found = f"none in frames {frames[0]} to {frames[1]}" if frames else "none"
         raise DataError(expected="truth with conf above 0", found=found, fix="choose frames that are labelled")
     tracks = chosen_rows(tracks, np.isin(tracks["frame"] + 1, scored))
+    if min_overlap is None:
+        tracks = chosen_rows(tracks, np.isfinite(tracks["x_m"]) & np.isfinite(tracks["y_m"]))
+    elif np.isnan(truth["x"]).all():
+        raise DataError(expected="truth with boxes", found="none", fix="leave out --min-overlap to match on the ground")
     distances = _by_pair(chosen_rows(pairs, np.isin(pairs["frame"] + 1, scored)))
     observed = chosen_rows(tracks, tracks["observed"].astype(np.bool_))
     (entities, pair_score), (observed_entities, observed_pairs) = (
@@ -229,11 +238,10 @@ def _score(
     return entities, _score_pairs(truth, track_id, distances, pairs_up_to_m)
 
 
-def _match(truth: Columns, tracks: Columns, min_overlap: float) -> IntArray:
+def _match(truth: Columns, tracks: Columns, min_overlap: float | None) -> IntArray:
     """Return for every truth row the row of its track, or -1."""
     track_row = np.full(len(truth["frame"]), _NO_TRACK)
-    has_boxes = not np.isnan(truth["x"]).all()
-    similarity, at_least = (_overlap, min_overlap) if has_boxes else (_nearness, 1.0 / (1.0 + _MAX_GROUND_M))
+    similarity, at_least = (_nearness, 1.0 / (1.0 + _MAX_GROUND_M)) if min_overlap is None else (_overlap, min_overlap)
     for frame in np.unique(truth["frame"]):
         rows, columns = np.flatnonzero(truth["frame"] == frame), np.flatnonzero(tracks["frame"] == frame - 1)
         first, second = assign(similarity(chosen_rows(truth, rows), chosen_rows(tracks, columns)), at_least)

@@ -8,6 +8,7 @@ jump from frame to frame; and the operator may name corner 0 once.
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 
 from standoff.core.camera import Camera
 from standoff.core.homography import FloatArray
@@ -15,6 +16,9 @@ from standoff.stages.ground.shape import ReferenceShape
 
 _FOCAL_STEPS = 48
 _DIFFERENCE_PX = 1e-3
+
+_ORDERS = np.array([np.roll(np.arange(4), -turn) for turn in range(4)])
+"""(4, 4) entry k: the corners starting with corner k."""
 
 
 def camera_misfit_px(
@@ -51,44 +55,63 @@ def camera_misfit_px(
         centre, focal_xy = np.array([(width - 1) / 2.0, (height - 1) / 2.0]), np.column_stack([focal, focal])
     else:
         centre, focal_xy = camera.matrix[:2, 2], np.array([[camera.matrix[0, 0], camera.matrix[1, 1]]])
-    moved = np.tile(corners_px - centre, (9, 1, 1))
-    moved[1:] += _DIFFERENCE_PX * np.eye(8).reshape(8, 4, 2)
-    orders = np.stack([np.roll(moved, -turn, axis=1) for turn in range(4)])
-    axes = _ground_axes(shape.corners_m, orders)
-    conditions = _metric_conditions(
-        axes[:, :, None] / np.append(focal_xy, np.ones((len(focal_xy), 1)), axis=1)[..., None]
-    )
-    here = conditions[:, 0]
-    slopes = np.moveaxis((conditions[:, 1:] - here[:, None]) / _DIFFERENCE_PX, 1, -1)
-    normal = slopes @ np.swapaxes(slopes, -1, -2)
-    squared = np.einsum("ofi,ofi->of", here, np.linalg.solve(normal, here[..., None])[..., 0])
-    misfit: FloatArray = np.sqrt(np.maximum(squared, 0.0)).min(axis=1)
-    return misfit
+    orders = (corners_px - centre)[_ORDERS]
+    return np.array([_nearest_seen_px(order, shape.corners_m, focal_xy) for order in orders])
 
 
-def _ground_axes(corners_m: FloatArray, corners_px: FloatArray) -> FloatArray:
-    """Return (..., 3, 2): the first two columns of the homographies from metres to (..., 4, 2) pixels."""
-    scale = float(np.ptp(corners_m))
-    x, y = (corners_m - corners_m.mean(axis=0)).T / scale
-    rows = np.zeros((*corners_px.shape[:-2], 8, 8))
-    rows[..., :4, 0], rows[..., :4, 1], rows[..., :4, 2] = x, y, 1.0
-    rows[..., 4:, 3], rows[..., 4:, 4], rows[..., 4:, 5] = x, y, 1.0
-    for half, axis in ((slice(0, 4), 0), (slice(4, 8), 1)):
-        rows[..., half, 6], rows[..., half, 7] = -corners_px[..., axis] * x, -corners_px[..., axis] * y
-    target = np.concatenate([corners_px[..., 0], corners_px[..., 1]], axis=-1)
-    solution = np.linalg.solve(rows, target[..., None])[..., 0]
-    axes: FloatArray = np.stack([solution[..., [0, 3, 6]], solution[..., [1, 4, 7]]], axis=-1)
+@njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+def _nearest_seen_px(corners_px: FloatArray, corners_m: FloatArray, focal_xy: FloatArray) -> float:  # pragma: no cover
+    """Return the misfit of one order at the focal length, one of (F, 2), that suits it best; inf if none does."""
+    axes = np.empty((9, 3, 2))
+    axes[0] = _ground_axes(corners_m, corners_px)
+    for k in range(8):
+        moved = corners_px.copy()
+        moved[k // 2, k % 2] += _DIFFERENCE_PX
+        axes[1 + k] = _ground_axes(corners_m, moved)
+    smallest = np.inf
+    for focal_x, focal_y in focal_xy:
+        skew, stretch = _metric_conditions(axes[0], focal_x, focal_y)
+        xx, xy, yy = 0.0, 0.0, 0.0
+        for k in range(1, 9):
+            moved_skew, moved_stretch = _metric_conditions(axes[k], focal_x, focal_y)
+            x, y = (moved_skew - skew) / _DIFFERENCE_PX, (moved_stretch - stretch) / _DIFFERENCE_PX
+            xx, xy, yy = xx + x * x, xy + x * y, yy + y * y
+        squared = (yy * skew**2 - 2.0 * xy * skew * stretch + xx * stretch**2) / (xx * yy - xy**2)
+        if squared < smallest:
+            smallest = squared
+    return np.sqrt(max(smallest, 0.0))
+
+
+@njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+def _ground_axes(corners_m: FloatArray, corners_px: FloatArray) -> FloatArray:  # pragma: no cover
+    """Return (3, 2), up to scale: the first two columns of the homography from (4, 2) metres to (4, 2) pixels.
+
+    Three corners as columns, each weighted so that they add up to the fourth: the homography is this matrix of the
+    pixels times the inverse of that of the metres.
+    """
+    axes = np.zeros((3, 2))
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        weight = _twice_area(corners_px, j, k) / _twice_area(corners_m, j, k)
+        across, along = corners_m[j, 1] - corners_m[k, 1], corners_m[k, 0] - corners_m[j, 0]
+        for row, pixel in enumerate((corners_px[i, 0], corners_px[i, 1], 1.0)):
+            axes[row, 0] += weight * pixel * across
+            axes[row, 1] += weight * pixel * along
     return axes
 
 
-def _metric_conditions(axes: FloatArray) -> FloatArray:
-    """Return (..., 2), both 0 where the two columns of (..., 3, 2) are perpendicular and equally long."""
-    first, second = axes[..., 0], axes[..., 1]
-    one, two = (first**2).sum(axis=-1), (second**2).sum(axis=-1)
-    conditions: FloatArray = (
-        np.stack([2.0 * (first * second).sum(axis=-1), one - two], axis=-1) / (one + two)[..., None]
-    )
-    return conditions
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _twice_area(corners: FloatArray, j: int, k: int) -> float:  # pragma: no cover
+    """Return that of the triangle of corners 3, j and k, with its sign."""
+    x, y = corners[3]
+    return (corners[j, 0] - x) * (corners[k, 1] - y) - (corners[k, 0] - x) * (corners[j, 1] - y)
+
+
+@njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+def _metric_conditions(axes: FloatArray, focal_x: float, focal_y: float) -> tuple[float, float]:  # pragma: no cover
+    """Return two numbers, both 0 where the camera sees the columns of (3, 2) perpendicular and equally long."""
+    x, y, z = axes[0] / focal_x, axes[1] / focal_y, axes[2]
+    one, two = x[0] ** 2 + y[0] ** 2 + z[0] ** 2, x[1] ** 2 + y[1] ** 2 + z[1] ** 2
+    return 2.0 * (x[0] * x[1] + y[0] * y[1] + z[0] * z[1]) / (one + two), (one - two) / (one + two)
 
 
 def turn_from_before(corners_px: FloatArray, before_px: FloatArray) -> int:
@@ -103,5 +126,4 @@ def turn_from_before(corners_px: FloatArray, before_px: FloatArray) -> int:
     1
     """
     now, then = (points - points.mean(axis=0) for points in (corners_px, before_px))
-    agreement = [float((np.roll(now, -turn, axis=0) * then).sum()) for turn in range(4)]
-    return int(np.argmax(agreement))
+    return int((now[_ORDERS] * then).sum(axis=(1, 2)).argmax())

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from scipy.ndimage import map_coordinates
+import numpy.typing as npt
+from numba import njit
 
 from standoff.core.camera import Camera
 from standoff.core.homography import BoolArray, FloatArray
@@ -146,13 +147,31 @@ def between_pixels(edges: Edges, gradients: Gradients) -> Edges:
     if not len(edges):
         return edges
     magnitude = cv2.magnitude(gradients.dx, gradients.dy)
-    columns, rows = (edges.points_px - (gradients.left_px, gradients.top_px)).T
-    step_x, step_y = edges.direction.T
-    before, here, after = (
-        map_coordinates(magnitude, [rows + k * step_y, columns + k * step_x], order=1, mode="nearest", output=float)
-        for k in (-1, 0, 1)
-    )
-    bend = before + after - 2.0 * here
-    shift = np.divide(before - after, 2.0 * bend, out=np.zeros_like(bend), where=bend < 0)
-    shift = np.clip(shift, -_MAX_SHIFT_PX, _MAX_SHIFT_PX)
-    return Edges(edges.points_px + shift[:, None] * edges.direction, edges.gradient)
+    direction = edges.direction
+    shift = _shifts_to_top(magnitude, edges.points_px - (gradients.left_px, gradients.top_px), direction)
+    return Edges(edges.points_px + shift[:, None] * direction, edges.gradient)
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _shifts_to_top(
+    magnitude: npt.NDArray[np.float32], points: FloatArray, direction: FloatArray
+) -> FloatArray:  # pragma: no cover
+    """Return (N,) how far along their (N, 2) directions the parabola through each point and one px around it peaks."""
+    shifts = np.zeros(len(points))
+    for k in range(len(points)):
+        x, y, step_x, step_y = points[k, 0], points[k, 1], direction[k, 0], direction[k, 1]
+        before, after = _between(magnitude, x - step_x, y - step_y), _between(magnitude, x + step_x, y + step_y)
+        bend = before + after - 2.0 * _between(magnitude, x, y)
+        if bend < 0:
+            shifts[k] = min(max((before - after) / (2.0 * bend), -_MAX_SHIFT_PX), _MAX_SHIFT_PX)
+    return shifts
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _between(values: npt.NDArray[np.float32], x: float, y: float) -> float:  # pragma: no cover
+    """Interpolate linearly; the point lies on the picture."""
+    column, row = min(int(x), values.shape[1] - 2), min(int(y), values.shape[0] - 2)
+    right, down = x - column, y - row
+    above = values[row, column] * (1.0 - right) + values[row, column + 1] * right
+    below = values[row + 1, column] * (1.0 - right) + values[row + 1, column + 1] * right
+    return above * (1.0 - down) + below * down

@@ -9,16 +9,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 from standoff.core.homography import FloatArray
-from standoff.core.types import NoGroundMap
+from standoff.core.types import IntArray, NoGroundMap
 
 NO_QUADRILATERAL = "the contours make no convex quadrilateral"
 OUTSIDE_BOX = "a corner lies outside the reference's box"
 TOO_SMALL = "the quadrilateral is too small for the reference's box"
 UNSUPPORTED = "a side of the quadrilateral has too few edge points"
 
-_PAIRINGS = np.array([[0, 1, 2, 3], [0, 1, 3, 2], [0, 2, 1, 3]])
+WALKS = ((0, 1, 2, 3), (0, 1, 3, 2), (0, 2, 1, 3))
 """The three ways to walk around four lines."""
 
 _MIN_SINE = 0.05
@@ -67,21 +68,58 @@ def join_lines(lines: FloatArray) -> tuple[FloatArray, FloatArray] | None:
     >>> sorted(map(tuple, (join_lines(lines)[0] + 0.0).tolist()))
     [(0.0, 0.0), (0.0, 3.0), (4.0, 0.0), (4.0, 3.0)]
     """
-    for pairing in _PAIRINGS:
-        around = lines[pairing]
-        meet = np.cross(np.roll(around, 1, axis=0), around)
-        if (np.abs(meet[:, 2]) < _MIN_SINE).any():
-            continue
-        corners = meet[:, :2] / meet[:, 2:]
-        sides = np.roll(corners, -1, axis=0) - corners
-        before = np.roll(sides, 1, axis=0)
-        turns = before[:, 0] * sides[:, 1] - before[:, 1] * sides[:, 0]
-        if (turns < 0).all():
-            return corners, around
-        if (turns > 0).all():
-            # Walked the other way, side k runs from old corner -k to old corner -k - 1: along old line -k - 1.
-            return corners[[0, 3, 2, 1]], around[[3, 2, 1, 0]]
+    meet = crossings(lines)
+    corners, sides = np.empty((4, 2)), np.empty(4, dtype=np.int64)
+    for walk in WALKS:
+        if walk_around(meet, walk, corners, sides):
+            return corners, lines[sides]
     return None
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def crossings(lines: FloatArray) -> FloatArray:  # pragma: no cover
+    """Return (M, M, 2) where each two of (M, 3) lines cross; NaN where they are nearly parallel."""
+    count = len(lines)
+    meet = np.full((count, count, 2), np.nan)
+    for i in range(count):
+        for j in range(count):
+            sine = lines[i, 0] * lines[j, 1] - lines[i, 1] * lines[j, 0]
+            if abs(sine) >= _MIN_SINE:
+                meet[i, j, 0] = (lines[i, 1] * lines[j, 2] - lines[i, 2] * lines[j, 1]) / sine
+                meet[i, j, 1] = (lines[i, 2] * lines[j, 0] - lines[i, 0] * lines[j, 2]) / sine
+    return meet
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def walk_around(
+    meet: FloatArray, walk: tuple[int, int, int, int], corners: FloatArray, sides: IntArray
+) -> bool:  # pragma: no cover
+    """Write down the quadrilateral that one walk along four lines makes.
+
+    Args:
+        meet: (M, M, 2) from `crossings`.
+        walk: The lines.
+        corners: (4, 2) to be filled, counter-clockwise as seen.
+        sides: (4,) to be filled: side k lies on line `sides[k]`.
+
+    Returns:
+        Whether it is convex.
+    """
+    for k in range(4):
+        sides[k] = walk[k]
+        corners[k, 0], corners[k, 1] = meet[walk[k - 1], walk[k], 0], meet[walk[k - 1], walk[k], 1]
+    left, right = 0, 0
+    for k in range(4):
+        before_x, before_y = corners[k - 1, 0] - corners[k - 2, 0], corners[k - 1, 1] - corners[k - 2, 1]
+        x, y = corners[k, 0] - corners[k - 1, 0], corners[k, 1] - corners[k - 1, 1]
+        turn = before_x * y - before_y * x
+        left, right = left + (turn < 0), right + (turn > 0)
+    if right == 4:
+        # Walked the other way, side k runs from old corner -k to old corner -k - 1: along old line -k - 1.
+        for axis in range(2):
+            corners[1, axis], corners[3, axis] = corners[3, axis], corners[1, axis]
+        sides[0], sides[1], sides[2], sides[3] = sides[3], sides[2], sides[1], sides[0]
+    return left == 4 or right == 4
 
 
 def quadrilateral_from_lines(
@@ -103,16 +141,9 @@ def quadrilateral_from_lines(
     if joined is None:
         return None
     corners, lines = joined
-    support, errors = np.zeros(4), np.full((4, 2), inlier_px**2)
+    support, errors = np.empty(4), np.empty((4, 2))
     for side, line in enumerate(lines):
-        near = points_px[np.abs(points_px @ line[:2] + line[2]) <= inlier_px]
-        start, end = corners[side], corners[(side + 1) % 4]
-        length = float(np.linalg.norm(end - start))
-        position = (near - start) @ (end - start) / length
-        between = (position >= 0) & (position <= length)
-        support[side] = min(len(np.unique(np.floor(position[between]))) / length, 1.0)
-        if between.sum() > 2 and np.ptp(position[between]) > 1.0:
-            errors[side] = _end_variances(near[between] @ line[:2] + line[2], position[between], length)
+        support[side], errors[side] = _supported(line, corners[side], corners[(side + 1) % 4], points_px, inlier_px)
     if sigma_px is not None:
         covariance = np.tile(np.eye(2) * sigma_px**2, (4, 1, 1))
     else:
@@ -120,23 +151,36 @@ def quadrilateral_from_lines(
     return Quadrilateral(corners, covariance, lines, support)
 
 
-def _end_variances(offset: FloatArray, position: FloatArray, length: float) -> FloatArray:
-    """Return (2,) variances of a fitted line's offset at both ends of its side."""
-    independent = max(len(offset) / _CORRELATED, 1.0)
-    variance = float(np.mean(offset**2)) / independent
-    spread = float(np.var(position))
-    ends = np.array([0.0, length]) - position.mean()
-    variances: FloatArray = variance * (1.0 + ends**2 / spread) + _MIN_OFFSET_PX**2
-    return variances
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _supported(
+    line: FloatArray, start: FloatArray, end: FloatArray, points_px: FloatArray, inlier_px: float
+) -> tuple[float, tuple[float, float]]:  # pragma: no cover
+    """Return the share of a side's length that has edge points, and its line's offset variances at both ends."""
+    along_x, along_y = end - start
+    length = np.hypot(along_x, along_y)
+    along_x, along_y = along_x / length, along_y / length
+    offset, position = np.empty(len(points_px)), np.empty(len(points_px))
+    count = 0
+    for x, y in points_px:
+        offset[count] = x * line[0] + y * line[1] + line[2]
+        position[count] = (x - start[0]) * along_x + (y - start[1]) * along_y
+        count += abs(offset[count]) <= inlier_px and 0.0 <= position[count] <= length
+    offset, position = offset[:count], position[:count]
+    support = min(len(np.unique(np.floor(position))) / length, 1.0)
+    if count <= 2 or np.ptp(position) <= 1.0:
+        return support, (inlier_px**2, inlier_px**2)
+    variance = np.mean(offset**2) / max(count / _CORRELATED, 1.0)
+    centre, spread = position.mean(), np.var(position)
+    at_start, at_end = 1.0 + centre**2 / spread, 1.0 + (length - centre) ** 2 / spread
+    return support, (variance * at_start + _MIN_OFFSET_PX**2, variance * at_end + _MIN_OFFSET_PX**2)
 
 
 def _corner_covariances(lines: FloatArray, end_variances: FloatArray) -> FloatArray:
     """Carry the sides' errors to the corners where they cross."""
-    covariances = np.empty((4, 2, 2))
-    for corner in range(4):
-        to_corner = np.linalg.inv(lines[[corner - 1, corner], :2])
-        errors = np.diag([end_variances[corner - 1, 1], end_variances[corner, 0]])
-        covariances[corner] = to_corner @ errors @ to_corner.T
+    before = np.arange(4) - 1
+    to_corner = np.linalg.inv(np.stack([lines[before, :2], lines[:, :2]], axis=1))
+    variances = np.column_stack([end_variances[before, 1], end_variances[:, 0]])
+    covariances: FloatArray = (to_corner * variances[:, None]) @ to_corner.transpose(0, 2, 1)
     return covariances
 
 

@@ -8,7 +8,9 @@ from standoff.core import homography
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import GroundMap
 
-_POINTS = 48  # a chord is within a quarter of a per cent of the radius
+_ANGLES = np.linspace(0.0, 2.0 * np.pi, 49)  # a chord is within a quarter of a per cent of the radius
+_RING = np.column_stack([np.cos(_ANGLES), np.sin(_ANGLES)])
+_RING[-1] = _RING[0]
 _NEAREST_SHARE = 0.02  # of the centre's depth: what is cut away lies far outside the picture
 
 
@@ -58,21 +60,32 @@ def circle_outlines_px(ground: GroundMap, centres_m: FloatArray, radii_m: FloatA
         it starts for a whole ellipse, none for an unknown position, behind the camera or where no lens sees.
     """
     ground_to_image = homography.invert(ground.image_to_ground)
-    angles = np.linspace(0.0, 2.0 * np.pi, _POINTS, endpoint=False)
-    ring = np.column_stack([np.cos(angles), np.sin(angles)])
-    depths = centres_m @ ground_to_image[2, :2] + ground_to_image[2, 2]
+    depths = _depths(ground_to_image, centres_m)
+    nearest = _NEAREST_SHARE * depths
+    rings_m = centres_m[:, None] + radii_m[:, None, None] * _RING
+    whole = (_depths(ground_to_image, rings_m) >= nearest[:, None]).all(axis=1)
+    outlines_px = ground.to_image(rings_m.reshape(-1, 2))[0].reshape(rings_m.shape)
     outlines: list[list[FloatArray]] = []
-    for centre, radius, depth in zip(centres_m, radii_m, depths, strict=True):
-        if not depth > 0:
+    for i in range(len(centres_m)):
+        outline_px = outlines_px[i]
+        if not depths[i] > 0:
             outlines.append([])
             continue
-        polygon = clip_in_front(ground_to_image, centre + radius * ring, _NEAREST_SHARE * depth)
-        points, _ = homography.apply(ground_to_image, np.vstack([polygon, polygon[:1]]))
-        outlines.append([points] if ground.camera is None else _finite_runs(ground.camera.distort(points)))
+        if not whole[i]:
+            polygon = clip_in_front(ground_to_image, rings_m[i, :-1], nearest[i])
+            outline_px = ground.to_image(np.vstack([polygon, polygon[:1]]))[0]
+        outlines.append(_finite_runs(outline_px))
     return outlines
+
+
+def _depths(ground_to_image: FloatArray, points_m: FloatArray) -> FloatArray:
+    depths: FloatArray = points_m @ ground_to_image[2, :2] + ground_to_image[2, 2]
+    return depths
 
 
 def _finite_runs(points_px: FloatArray) -> list[FloatArray]:
     seen: BoolArray = np.asarray(np.isfinite(points_px).all(axis=1))
+    if seen.all():
+        return [points_px]
     runs = np.split(np.arange(len(seen)), np.flatnonzero(np.diff(seen)) + 1)
     return [points_px[run] for run in runs if len(run) > 1 and seen[run[0]]]

@@ -24,6 +24,10 @@ HEX: Mapping[Tone, str] = MappingProxyType(
     }
 )
 
+_BGR: Mapping[Tone, Bgr] = MappingProxyType(
+    {tone: (int(code[5:7], 16), int(code[3:5], 16), int(code[1:3], 16)) for tone, code in HEX.items()}
+)
+
 
 def bgr(tone: Tone) -> Bgr:
     """Return a colour for OpenCV.
@@ -31,8 +35,7 @@ def bgr(tone: Tone) -> Bgr:
     >>> bgr("danger")
     (74, 72, 245)
     """
-    red, green, blue = bytes.fromhex(HEX[tone][1:])
-    return blue, green, red
+    return _BGR[tone]
 
 
 def class_tone(class_id: int) -> Tone:

@@ -32,9 +32,11 @@ class TextSprites:
         return self._sprites[key]
 
     def _rendered(self, text: str, size_px: int, bold: bool) -> ImageArray:
+        if len(text) > 1:  # texts are often new, their letters never
+            return np.hstack([self.sprite(letter, size_px, bold=bold) for letter in text])
         font = self._font(size_px, bold)
         ascent, descent = font.getmetrics()
-        picture = Image.new("RGB", (max(1, int(np.ceil(font.getlength(text)))), ascent + descent))
+        picture = Image.new("RGB", (max(1, round(font.getlength(text))), ascent + descent))
         ImageDraw.Draw(picture).text((0, 0), text, fill=bgr("light"), font=font)
         return np.asarray(picture)
 
