@@ -28,7 +28,11 @@ def results() -> list[FrameResult]:
 
 def _each(items: list[_Item], action: Callable[[_Item], object]) -> Callable[[], None]:
     endless = itertools.cycle(items)
-    return lambda: action(next(endless))
+
+    def act() -> None:
+        action(next(endless))
+
+    return act
 
 
 def _composing(composer: Composer, results: list[FrameResult]) -> Callable[[], None]:

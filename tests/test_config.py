@@ -75,6 +75,7 @@ def test_the_command_line_wins_over_the_environment_and_that_over_the_file(
         ("- a\n- b\n", "list"),
         ("a: [\n", "YAML"),
         ("replace: {detect: {factory: nonsense}}\n", "factory"),
+        ("extra_outputs: {record: {factory: 'a:b'}}\n", "record is the name of an output"),
     ],
 )
 def test_wrong_settings_are_one_line_that_says_where_and_what(tmp_path: Path, text: str, telling: str) -> None:
@@ -108,7 +109,7 @@ def test_every_stage_can_be_replaced_by_name(tmp_path: Path) -> None:
 @pytest.mark.parametrize("factory", ["no_such_module:Thing", "test_config:NoSuchThing"])
 def test_a_replacement_that_is_not_there_is_one_line(factory: str) -> None:
     settings = load_settings(overrides={"replace": {"detect": {"factory": factory}}})
-    with pytest.raises(ConfigError, match="to make the stage detect"):
+    with pytest.raises(ConfigError, match="to make detect"):
         build_pipeline(settings, frames=())
 
 

@@ -70,7 +70,9 @@ class ReferenceSettings(_Section):
         tuple[float, float, float, float] | None,
         Field(description="Its box in one frame: left, top, right, bottom; px. Absent: the detector finds it."),
     ] = None
-    box_time_s: Annotated[float, Field(ge=0, description="The time of that frame; s.")] = 0.0
+    box_time_s: Annotated[
+        float | None, Field(ge=0, description="The time of that frame; s. Absent: the first frame that is read.")
+    ] = None
     first_corner_px: Annotated[
         Point | None, Field(description="Picture point nearest the first corner in that frame; px.")
     ] = None
@@ -156,6 +158,13 @@ class Settings(BaseSettings):
         for name, info in cls.model_fields.items():
             _refuse_unknown(info.annotation, values.get(name), name)
         return values
+
+    @model_validator(mode="after")
+    def _refuse_taken_names(self) -> Settings:
+        taken = sorted(self.extra_outputs.keys() & {*OUTPUT_NAMES, "record"})
+        if taken:
+            raise ValueError(f"extra_outputs: {', '.join(taken)} is the name of an output of standoff's own")
+        return self
 
 
 def _refuse_unknown(annotation: object, value: object, path: str) -> None:
@@ -266,9 +275,9 @@ def build_replacement(name: str, replacement: Replacement) -> Any:  # noqa: ANN4
     try:
         factory = getattr(importlib.import_module(module_name), attribute)
         return factory(**replacement.options)
-    except (ImportError, AttributeError, TypeError) as error:
+    except (ImportError, AttributeError, TypeError, ValueError, OSError) as error:
         raise ConfigError(
-            expected=f"{replacement.factory} to make the stage {name}",
+            expected=f"{replacement.factory} to make {name}",
             found=str(error),
             fix="name an importable `package.module:callable` and options that it takes",
         ) from error

@@ -15,11 +15,13 @@ from pathlib import Path
 from typing import Any
 
 from standoff.config import Settings, build_pipeline, build_replacement, resolved
+from standoff.core.errors import OutputError
 from standoff.core.types import FrameResult, Sink
 from standoff.pipeline import Pipeline
 from standoff.stages.frames import Source, open_source
 from standoff.stages.sinks import (
     FRAMES,
+    OUTPUT_FILES,
     PROXIMITY,
     TRACKS,
     HazardSink,
@@ -68,6 +70,7 @@ def open_run(source: Path | str, out: Path | str, settings: Settings, *, overwri
     Raises:
         StandoffError: A source, model, survey, camera, setting or folder that cannot be used.
     """
+    _refuse_own_source(Path(source).resolve(), Path(out).resolve())
     frames = open_source(
         source, start_s=settings.start_s, stop_s=settings.stop_s, every=settings.every, fps=settings.fps
     )
@@ -78,13 +81,24 @@ def open_run(source: Path | str, out: Path | str, settings: Settings, *, overwri
         "model": getattr(pipeline.detector, "description", None),
         "ground": getattr(pipeline.ground, "description", None),
     }
+    extra = {name: build_replacement(name, replacement) for name, replacement in settings.extra_outputs.items()}
     folder = prepare_output(out, overwrite=overwrite)
-    pipeline.sinks = build_sinks(settings, folder, frames, descriptions)
+    own = build_sinks(settings, folder, descriptions)
+    # The record last, so that it times all others.
+    pipeline.sinks = {**own, **extra, "record": RecordSink(folder / RECORD, descriptions)}
     return Run(frames, pipeline, folder)
 
 
-def build_sinks(settings: Settings, folder: Path, frames: Source, descriptions: dict[str, Any]) -> dict[str, Sink]:
-    """Make the configured outputs, the record last, so that it times all others."""
+def _refuse_own_source(source: Path, out: Path) -> None:
+    """Raise OutputError where the outputs would replace the source, or lie among its pictures."""
+    if source == out or (source.parent == out and source.name in OUTPUT_FILES):
+        raise OutputError(
+            expected="outputs apart from the source", found=f"{source} and {out}", fix="choose another output folder"
+        )
+
+
+def build_sinks(settings: Settings, folder: Path, descriptions: dict[str, Any]) -> dict[str, Sink]:
+    """Make the configured outputs of standoff's own, without the record."""
     makers: dict[str, Any] = {
         "tracks": lambda: TableSink(folder / "tracks.parquet", TRACKS, settings.tables),
         "proximity": lambda: TableSink(folder / "proximity.parquet", PROXIMITY, settings.tables),
@@ -95,8 +109,4 @@ def build_sinks(settings: Settings, folder: Path, frames: Source, descriptions: 
             folder / "report.html", settings.report, descriptions, warning_gap_m=settings.hazard.buffer_m
         ),
     }
-    sinks: dict[str, Sink] = {name: makers[name]() for name in settings.outputs}
-    for name, replacement in settings.extra_outputs.items():
-        sinks[name] = build_replacement(name, replacement)
-    sinks["record"] = RecordSink(folder / RECORD, descriptions)
-    return sinks
+    return {name: makers[name]() for name in settings.outputs}

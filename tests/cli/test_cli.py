@@ -233,6 +233,65 @@ def test_a_truncated_video_keeps_what_was_read_and_says_that_it_is_not_all(
     assert pq.read_table(tmp_path / "out" / "frames.parquet").num_rows == record["counts"]["frames"]
 
 
+def test_a_run_that_fails_on_its_first_frame_is_one_line_and_a_record_of_it(
+    call: Call, video: Path, site: Path, tmp_path: Path
+) -> None:
+    words = ("--ground", "square:2", "--reference-box", "900,900,950,950")
+    code, out, err = call("run", video, "--config", site, "--out", tmp_path / "out", *words)
+    assert (code, out) == (2, "")
+    assert err.startswith("standoff: expected a box in the picture") and err.count("\n") == 1
+    assert json.loads((tmp_path / "out" / "run.json").read_text())["status"] == "failed"
+
+
+def test_the_reference_box_is_for_the_first_frame_that_is_read(
+    call: Call, video: Path, site: Path, tmp_path: Path
+) -> None:
+    words = ("--ground", "square:2", "--reference-box", "100,100,150,150", "--start", 1.0)
+    code, _, err = call("run", video, "--config", site, "--out", tmp_path / "out", *words)
+    assert (code, "no frame could be measured" in err) == (1, True)
+
+
+def test_a_square_on_the_command_line_replaces_another_shape_in_the_file(
+    call: Call, video: Path, tmp_path: Path
+) -> None:
+    reference = {"rectangle_m": [2.0, 3.0], "box_px": [100, 100, 150, 150], "params": {"method": "paper"}}
+    site = tmp_path / "site.yaml"
+    site.write_text(
+        yaml.safe_dump(
+            {"ground": {"reference": reference}, "replace": {"detect": {"factory": "cli.test_cli:Approach"}}}
+        ),
+        encoding="utf-8",
+    )
+    call("run", video, "--config", site, "--out", tmp_path / "out", "--ground", "square:2", "--outputs", "")
+    ground = json.loads((tmp_path / "out" / "run.json").read_text())["ground"]
+    assert ground["corners_m"] == [[0, 0], [2, 0], [2, 2], [0, 2]]
+    assert (ground["params"]["method"], ground["box_xyxy_px"]) == ("paper", [100, 100, 150, 150])
+
+
+@pytest.mark.parametrize("factory", ["no_such_module:Thing", "cli.test_cli:unplugged"])
+def test_an_output_of_ones_own_that_cannot_be_made_leaves_the_folder_as_it_was(
+    call: Call, video: Path, site: Path, tmp_path: Path, factory: str
+) -> None:
+    assert call("run", video, "--config", site, "--out", tmp_path / "out", "--quiet")[0] == 0
+    before = (tmp_path / "out" / "run.json").read_bytes()
+    settings = yaml.safe_load(site.read_text()) | {"extra_outputs": {"siren": {"factory": factory}}}
+    site.write_text(yaml.safe_dump(settings), encoding="utf-8")
+    code, _, err = call("run", video, "--config", site, "--out", tmp_path / "out", "--overwrite")
+    assert (code, err.count("\n"), "to make siren" in err) == (2, 1, True)
+    assert (tmp_path / "out" / "run.json").read_bytes() == before
+
+
+def unplugged() -> None:
+    raise OSError("no such port")
+
+
+def test_a_run_never_replaces_its_own_source(call: Call, video: Path, site: Path, tmp_path: Path) -> None:
+    source = video.rename(tmp_path / "annotated.mp4")
+    code, _, err = call("run", source, "--config", site, "--out", tmp_path, "--overwrite")
+    assert (code, err.count("\n"), "apart from the source" in err) == (2, 1, True)
+    assert source.stat().st_size > 0
+
+
 @pytest.mark.parametrize("ending", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_run_leaves_whole_files_that_say_so(
     video: Path, site: Path, tmp_path: Path, ending: signal.Signals

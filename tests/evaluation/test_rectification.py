@@ -51,6 +51,12 @@ def test_the_compiled_ransac_is_the_loops_equal_and_the_result_is_plain(result: 
     assert len(record["scores"]) == 9
 
 
+def test_what_no_method_found_is_null_in_the_record() -> None:
+    nothing = MethodScore("paper", "hard", 1, 100.0, 0.0, math.nan, math.nan, math.nan)
+    (row,) = RectificationResult(1, 0, (nothing,), 1.0, 50.0, True).to_dict()["scores"]
+    assert (row["failed_percent"], row["corner_rmse_px"]) == (100.0, None)
+
+
 def test_corners_do_not_depend_on_the_run(result: RectificationResult) -> None:
     again = evaluate_rectification(scenes=16, seed=7, methods=("oriented",))
     for one in again.scores:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from standoff.core.errors import ConfigError
+from standoff.core.errors import ConfigError, StandoffError
 
 if TYPE_CHECKING:
     from standoff.monitor import Run
@@ -24,7 +24,9 @@ def _numbers(text: str, count: int, option: str) -> tuple[float, ...]:
         numbers = ()
     if len(numbers) != count:
         raise ConfigError(
-            expected=f"{count} numbers with commas for {option}", found=repr(text), fix="write for example 10,20,30,40"
+            expected=f"{count} number{'s with commas' * (count > 1)} for {option}",
+            found=repr(text),
+            fix=f"write for example {','.join(['10', '20', '30', '40'][:count])}",
         )
     return numbers
 
@@ -33,7 +35,10 @@ def _ground_overrides(ground: str | None, box: str | None, camera: Path | None) 
     """Translate `--ground`, `--reference-box` and `--camera` into settings."""
     overrides: dict[str, Any] = {}
     if ground is not None and ground.startswith("square:"):
-        overrides["reference"] = {"square_m": _numbers(ground.removeprefix("square:"), 1, "--ground square:SIDE")[0]}
+        # The file's reference may have another shape; its box and method go on.
+        others = dict.fromkeys(("rectangle_m", "sides_m", "diagonal_m", "corners_m"))
+        side_m = _numbers(ground.removeprefix("square:"), 1, "--ground square:SIDE")[0]
+        overrides["reference"] = {"square_m": side_m, **others}
         overrides["survey"] = None
     elif ground == "none":
         overrides |= {"survey": None, "reference": None}
@@ -99,8 +104,11 @@ def run(
     opened = open_run(source, out, load_settings(config, overrides), overwrite=overwrite)
     try:
         _watch(opened, quiet=quiet)
-    finally:
-        _tell(out / RECORD, as_json=as_json, quiet=quiet)
+    except StandoffError:
+        # Its own line says it all; only a machine still wants the record.
+        _tell(out / RECORD, as_json=as_json, quiet=True)
+        raise
+    _tell(out / RECORD, as_json=as_json, quiet=quiet)
     raise typer.Exit(_status(out / RECORD))
 
 

@@ -74,8 +74,11 @@ class RectificationResult:
         return self.loop_ms / self.ransac_ms
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain numbers, strings and lists."""
-        return {**asdict(self), "scores": [asdict(score) for score in self.scores], "speed_up": self.speed_up}
+        """Return plain numbers, strings and lists; None where nothing was found to measure."""
+        scores = [
+            {name: None if value != value else value for name, value in asdict(score).items()} for score in self.scores
+        ]
+        return {**asdict(self), "scores": scores, "speed_up": self.speed_up}
 
 
 def evaluate_rectification(

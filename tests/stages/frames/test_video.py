@@ -317,3 +317,9 @@ def test_an_edit_list_that_drops_pictures_is_no_truncation(tmp_path: Path) -> No
             packet.pts, packet.dts, packet.stream = packet.pts - shift, packet.dts - shift, stream
             target.mux(packet)
     assert [index_in(frame.image) for frame in read(trimmed)][-1] == 59
+
+
+def test_a_matroska_clock_that_starts_late_is_no_truncation(tmp_path: Path) -> None:
+    path = write_video(tmp_path / "late.mkv", 20, Recipe(times_ms=[600_000 + 100 * i for i in range(20)]))
+    frames = read(path)
+    assert [frame.time_s for frame in frames] == pytest.approx([0.1 * i for i in range(20)])

@@ -137,12 +137,14 @@ class Header:
 def _duration_s(container: InputContainer, stream: VideoStream) -> float | None:
     if stream.duration is not None and stream.time_base is not None:
         return float(stream.duration * stream.time_base)
+    # Matroska counts from 0 to the end, also where the first picture comes later.
+    start_s = float((stream.start_time or 0) * (stream.time_base or 0)) if "matroska" in container.format.name else 0.0
     tag = stream.metadata.get("DURATION", "")  # Matroska's "00:01:02.345000000"
     if tag.count(":") == 2 and tag.replace(":", "").replace(".", "", 1).isdecimal():
         hours, minutes, seconds = tag.split(":")
-        return int(hours) * 3600 + int(minutes) * 60 + float(seconds)
+        return int(hours) * 3600 + int(minutes) * 60 + float(seconds) - start_s
     if container.duration is not None and len(container.streams) == 1:
-        return float(container.duration / av.time_base)
+        return float(container.duration / av.time_base) - start_s
     return None
 
 

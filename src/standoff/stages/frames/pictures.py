@@ -73,6 +73,7 @@ class Scaler:
             height=height_px,
             format=pixel_format,
             interpolation="AREA" if shrinks else "BILINEAR",
+            threads=cv2.getNumThreads(),
         )
 
 

@@ -62,18 +62,18 @@ def camera_misfit_px(
 @njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
 def _nearest_seen_px(corners_px: FloatArray, corners_m: FloatArray, focal_xy: FloatArray) -> float:  # pragma: no cover
     """Return the misfit of one order at the focal length, one of (F, 2), that suits it best; inf if none does."""
-    axes = np.empty((9, 3, 2))
-    axes[0] = _ground_axes(corners_m, corners_px)
+    axes = np.zeros((9, 3, 2))
+    _add_ground_axes(corners_m, corners_px, axes[0])
     for k in range(8):
         moved = corners_px.copy()
         moved[k // 2, k % 2] += _DIFFERENCE_PX
-        axes[1 + k] = _ground_axes(corners_m, moved)
+        _add_ground_axes(corners_m, moved, axes[1 + k])
     smallest = np.inf
-    for focal_x, focal_y in focal_xy:
-        skew, stretch = _metric_conditions(axes[0], focal_x, focal_y)
+    for f in range(len(focal_xy)):
+        skew, stretch = _metric_conditions(axes[0], focal_xy[f, 0], focal_xy[f, 1])
         xx, xy, yy = 0.0, 0.0, 0.0
         for k in range(1, 9):
-            moved_skew, moved_stretch = _metric_conditions(axes[k], focal_x, focal_y)
+            moved_skew, moved_stretch = _metric_conditions(axes[k], focal_xy[f, 0], focal_xy[f, 1])
             x, y = (moved_skew - skew) / _DIFFERENCE_PX, (moved_stretch - stretch) / _DIFFERENCE_PX
             xx, xy, yy = xx + x * x, xy + x * y, yy + y * y
         squared = (yy * skew**2 - 2.0 * xy * skew * stretch + xx * stretch**2) / (xx * yy - xy**2)
@@ -83,35 +83,35 @@ def _nearest_seen_px(corners_px: FloatArray, corners_m: FloatArray, focal_xy: Fl
 
 
 @njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
-def _ground_axes(corners_m: FloatArray, corners_px: FloatArray) -> FloatArray:  # pragma: no cover
-    """Return (3, 2), up to scale: the first two columns of the homography from (4, 2) metres to (4, 2) pixels.
+def _add_ground_axes(corners_m: FloatArray, corners_px: FloatArray, axes: FloatArray) -> None:  # pragma: no cover
+    """Add to (3, 2) the first two columns, at some scale, of the homography from (4, 2) metres to (4, 2) pixels.
 
     Three corners as columns, each weighted so that they add up to the fourth: the homography is this matrix of the
     pixels times the inverse of that of the metres.
     """
-    axes = np.zeros((3, 2))
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         weight = _twice_area(corners_px, j, k) / _twice_area(corners_m, j, k)
-        across, along = corners_m[j, 1] - corners_m[k, 1], corners_m[k, 0] - corners_m[j, 0]
+        by_x, by_y = weight * (corners_m[j, 1] - corners_m[k, 1]), weight * (corners_m[k, 0] - corners_m[j, 0])
         for row, pixel in enumerate((corners_px[i, 0], corners_px[i, 1], 1.0)):
-            axes[row, 0] += weight * pixel * across
-            axes[row, 1] += weight * pixel * along
-    return axes
+            axes[row, 0] += pixel * by_x
+            axes[row, 1] += pixel * by_y
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
 def _twice_area(corners: FloatArray, j: int, k: int) -> float:  # pragma: no cover
     """Return that of the triangle of corners 3, j and k, with its sign."""
-    x, y = corners[3]
-    return (corners[j, 0] - x) * (corners[k, 1] - y) - (corners[k, 0] - x) * (corners[j, 1] - y)
+    jx, jy = corners[j, 0] - corners[3, 0], corners[j, 1] - corners[3, 1]
+    kx, ky = corners[k, 0] - corners[3, 0], corners[k, 1] - corners[3, 1]
+    return jx * ky - kx * jy
 
 
 @njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
 def _metric_conditions(axes: FloatArray, focal_x: float, focal_y: float) -> tuple[float, float]:  # pragma: no cover
     """Return two numbers, both 0 where the camera sees the columns of (3, 2) perpendicular and equally long."""
-    x, y, z = axes[0] / focal_x, axes[1] / focal_y, axes[2]
-    one, two = x[0] ** 2 + y[0] ** 2 + z[0] ** 2, x[1] ** 2 + y[1] ** 2 + z[1] ** 2
-    return 2.0 * (x[0] * x[1] + y[0] * y[1] + z[0] * z[1]) / (one + two), (one - two) / (one + two)
+    one_x, one_y, one_z = axes[0, 0] / focal_x, axes[1, 0] / focal_y, axes[2, 0]
+    two_x, two_y, two_z = axes[0, 1] / focal_x, axes[1, 1] / focal_y, axes[2, 1]
+    one, two = one_x**2 + one_y**2 + one_z**2, two_x**2 + two_y**2 + two_z**2
+    return 2.0 * (one_x * two_x + one_y * two_y + one_z * two_z) / (one + two), (one - two) / (one + two)
 
 
 def turn_from_before(corners_px: FloatArray, before_px: FloatArray) -> int:

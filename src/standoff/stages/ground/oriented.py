@@ -14,12 +14,13 @@ from itertools import combinations
 
 import cv2
 import numpy as np
+from numba import njit
 
-from standoff.core.homography import FloatArray
+from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import IntArray, NoGroundMap
 from standoff.stages.ground.edges import Edges, Gradients
 from standoff.stages.ground.lines import fit_line_robustly
-from standoff.stages.ground.quadrilateral import NO_QUADRILATERAL, join_lines
+from standoff.stages.ground.quadrilateral import NO_QUADRILATERAL, WALKS, crossings, join_lines, walk_around
 from standoff.stages.ground.voting import agreeing, candidate_lines
 
 RIVALS = "two outlines in the reference's box fit equally well"
@@ -28,17 +29,10 @@ _NOISE_HIGH, _NOISE_LOW = 3.5, 2.0
 """Canny's thresholds in medians of the gradient; of pure noise, one pixel in 5000 passes the upper one."""
 
 _CANDIDATES = 12
-_WALKS = np.array(
-    [
-        [four[k] for k in walk]
-        for four in combinations(range(_CANDIDATES), 4)
-        for walk in ((0, 1, 2, 3), (0, 1, 3, 2), (0, 2, 1, 3))
-    ]
-)
+_WALKS = np.array([[four[k] for k in walk] for four in combinations(range(_CANDIDATES), 4) for walk in WALKS])
 """(1485, 4) every way to walk around four of the candidate lines."""
 
 _COVER_PX, _COVER_COSINE = 1.5, 0.9
-_MIN_SINE = 0.05
 _MIN_COVERED = 0.2
 _MIN_SIDE = 0.15
 _OUTSIDE = 0.05
@@ -94,11 +88,7 @@ def oriented_lines(
 def _covered_before(lines: FloatArray, points: FloatArray, direction: FloatArray, size: FloatArray) -> FloatArray:
     """Return (M, 2 R + 1): pixels of each line with an edge point on them, counted from R px before its foot."""
     reach = int(np.hypot(*size)) + int(_BEYOND_TO_PX)
-    covered = np.zeros((len(lines), 2 * reach), dtype=bool)
-    for row, line in zip(covered, lines, strict=True):
-        mine = points[agreeing(line, points, direction, _COVER_PX, _COVER_COSINE)]
-        steps = np.floor(mine @ (-line[1], line[0])).astype(int) + reach
-        row[steps[(steps >= 0) & (steps < 2 * reach)]] = True
+    covered = _covered_pixels(lines, points, direction, reach)
     # A slanted edge has fewer pixels than its length: a hole of one between two hits is covered too.
     covered[:, 1:-1] |= covered[:, :-2] & covered[:, 2:]
     count: FloatArray = np.zeros((len(lines), 2 * reach + 1))
@@ -106,35 +96,31 @@ def _covered_before(lines: FloatArray, points: FloatArray, direction: FloatArray
     return count
 
 
-def _crossings(lines: FloatArray, size: FloatArray) -> FloatArray:
-    """Return (M, M, 2) where lines cross; NaN where nearly parallel or out of the box."""
-    meet = np.cross(lines[:, None], lines[None])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        crossings: FloatArray = meet[..., :2] / meet[..., 2:]
-    reach = size / 2.0 + _OUTSIDE * size.max()
-    with np.errstate(invalid="ignore"):
-        crossings[(np.abs(meet[..., 2]) < _MIN_SINE) | (np.abs(crossings) > reach).any(axis=-1)] = np.nan
-    return crossings
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _covered_pixels(
+    lines: FloatArray, points: FloatArray, direction: FloatArray, reach: int
+) -> BoolArray:  # pragma: no cover
+    covered = np.zeros((len(lines), 2 * reach), dtype=np.bool_)
+    for row in range(len(lines)):
+        mine = agreeing(lines[row], points, direction, _COVER_PX, _COVER_COSINE)
+        for k in range(len(points)):
+            if mine[k]:
+                step = int(np.floor(points[k, 1] * lines[row, 0] - points[k, 0] * lines[row, 1])) + reach
+                if 0 <= step < 2 * reach:
+                    covered[row, step] = True
+    return covered
 
 
 def _best_four(
     lines: FloatArray, covered_before: FloatArray, size: FloatArray, believable: Callable[[FloatArray], bool]
 ) -> IntArray | NoGroundMap:
     """Return the indices of the four lines, in walking order, whose quadrilateral the edges support best."""
+    meet = crossings(lines)
+    reach = size / 2.0 + _OUTSIDE * size.max()
+    meet[(np.abs(meet) > reach).any(axis=-1)] = np.nan
     walks = _WALKS[(len(lines) > _WALKS).all(axis=1)]
-    corners = _crossings(lines, size)[np.roll(walks, 1, axis=1), walks]
-    known = np.isfinite(corners).all(axis=(1, 2))
-    walks, corners = walks[known], corners[known]
-    sides = np.roll(corners, -1, axis=1) - corners
-    before = np.roll(sides, 1, axis=1)
-    turns = before[..., 0] * sides[..., 1] - before[..., 1] * sides[..., 0]
-    convex = (turns > 0).all(axis=1) | (turns < 0).all(axis=1)
-    # Walked clockwise, turn around: corner order 0, 3, 2, 1 lies on sides 3, 2, 1, 0.
-    clockwise = convex & (turns > 0).all(axis=1)
-    corners[clockwise] = corners[clockwise][:, [0, 3, 2, 1]]
-    walks[clockwise] = walks[clockwise][:, [3, 2, 1, 0]]
-    walks, corners = walks[convex], corners[convex]
-    score = _scores(lines[walks], covered_before, walks, corners, size)
+    corners = np.empty((len(walks), 4, 2))
+    score = _fill_scores(lines, covered_before, meet, size, walks, corners)
     return _first_believable(walks, corners, score, believable)
 
 
@@ -155,34 +141,55 @@ def _first_believable(
     return chosen
 
 
-def _scores(
-    sides: FloatArray, covered_before: FloatArray, walks: IntArray, corners: FloatArray, size: FloatArray
-) -> FloatArray:
-    """Return (Q,) pixels of outline that edges support, less what is bare and what runs on beyond a corner."""
-    along = np.stack([-sides[..., 1], sides[..., 0]], axis=-1)
-    start, end = (corners * along).sum(axis=-1), (np.roll(corners, -1, axis=1) * along).sum(axis=-1)
-    start, end = np.minimum(start, end), np.maximum(start, end)
-    reach = covered_before.shape[1] // 2
-
-    def covered(low: FloatArray, high: FloatArray) -> FloatArray:
-        at = (np.clip(np.rint(edge).astype(int) + reach, 0, 2 * reach) for edge in (high, low))
-        high_count, low_count = (covered_before[walks, index] for index in at)
-        difference: FloatArray = high_count - low_count
-        return difference
-
-    length, on_side = end - start, covered(start, end)
-    beyond = covered(start - _BEYOND_TO_PX, start - _BEYOND_FROM_PX) + covered(
-        end + _BEYOND_FROM_PX, end + _BEYOND_TO_PX
-    )
-    score = (on_side - _BARE_COST * (length - on_side) - _BEYOND_COST * beyond).sum(axis=1)
-    centre = corners.mean(axis=1)[:, None]
-    bright_inside = (sides[..., :2] * centre).sum(axis=-1) + sides[..., 2] > 0
-    mixed = bright_inside.any(axis=1) & ~bright_inside.all(axis=1)
-    fill = np.prod(np.ptp(corners, axis=1) / size, axis=1)
-    score = score * np.where(mixed, _MIXED_POLARITY, 1.0) * np.sqrt(np.minimum(fill, 1.0))
-    hopeless = (length < _MIN_SIDE * size.min()).any(axis=1) | (on_side < _MIN_COVERED * length).any(axis=1)
-    scores: FloatArray = np.where(hopeless, 0.0, score)
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _fill_scores(
+    lines: FloatArray,
+    covered_before: FloatArray,
+    meet: FloatArray,
+    size: FloatArray,
+    walks: IntArray,
+    corners: FloatArray,
+) -> FloatArray:  # pragma: no cover
+    """Return (Q,) scores of (Q, 4) walks, 0 where hopeless; put the (Q, 4, 2) corners and the walks in order."""
+    scores = np.zeros(len(walks))
+    sides = np.empty(4, dtype=np.int64)
+    for k in range(len(walks)):
+        if walk_around(meet, walks[k], corners[k], sides):
+            walks[k] = sides
+            scores[k] = _score(lines, covered_before, sides, corners[k], size)
     return scores
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _score(
+    lines: FloatArray, covered_before: FloatArray, sides: IntArray, corners: FloatArray, size: FloatArray
+) -> float:  # pragma: no cover
+    """Return pixels of outline that edges support, less what is bare and what runs on beyond a corner."""
+    centre_x, centre_y = corners[:, 0].mean(), corners[:, 1].mean()
+    score, bright_inside = 0.0, 0
+    for k in range(4):
+        a, b, c = lines[sides[k], 0], lines[sides[k], 1], lines[sides[k], 2]
+        start, end = corners[k, 1] * a - corners[k, 0] * b, corners[k - 3, 1] * a - corners[k - 3, 0] * b
+        start, end = min(start, end), max(start, end)
+        before, length = covered_before[sides[k]], end - start
+        covered = _covered(before, start, end)
+        if length < _MIN_SIDE * size.min() or covered < _MIN_COVERED * length:
+            return 0.0
+        beyond = _covered(before, start - _BEYOND_TO_PX, start - _BEYOND_FROM_PX)
+        beyond += _covered(before, end + _BEYOND_FROM_PX, end + _BEYOND_TO_PX)
+        score += covered - _BARE_COST * (length - covered) - _BEYOND_COST * beyond
+        bright_inside += centre_x * a + centre_y * b + c > 0
+    polarity = 1.0 if bright_inside in (0, 4) else _MIXED_POLARITY
+    fill = (np.ptp(corners[:, 0]) / size[0]) * (np.ptp(corners[:, 1]) / size[1])
+    return score * polarity * np.sqrt(min(fill, 1.0))
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _covered(before: FloatArray, low: float, high: float) -> float:  # pragma: no cover
+    """Return how many of a line's pixels from `low` to `high` are covered."""
+    most = len(before) - 1
+    first, last = int(np.rint(low)) + most // 2, int(np.rint(high)) + most // 2
+    return before[min(max(last, 0), most)] - before[min(max(first, 0), most)]
 
 
 def _refitted(lines: FloatArray, points: FloatArray, direction: FloatArray) -> FloatArray | None:
@@ -197,12 +204,15 @@ def _refitted(lines: FloatArray, points: FloatArray, direction: FloatArray) -> F
     return None if joined is None else joined[1]
 
 
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def _side_line(
     line: FloatArray, start: FloatArray, end: FloatArray, points: FloatArray, direction: FloatArray
-) -> FloatArray:
+) -> FloatArray:  # pragma: no cover
     """Refit one side to the edge points between its corners."""
-    length = float(np.linalg.norm(end - start))
-    position = (points - start) @ (end - start) / length
-    between = (position > _REFIT_TRIM_PX) & (position < length - _REFIT_TRIM_PX)
-    mine = between & agreeing(line, points, direction, _REFIT_PX, _COVER_COSINE)
+    along_x, along_y = end[0] - start[0], end[1] - start[1]
+    length = np.hypot(along_x, along_y)
+    mine = agreeing(line, points, direction, _REFIT_PX, _COVER_COSINE)
+    for k in range(len(points)):
+        position = ((points[k, 0] - start[0]) * along_x + (points[k, 1] - start[1]) * along_y) / length
+        mine[k] &= _REFIT_TRIM_PX < position < length - _REFIT_TRIM_PX
     return fit_line_robustly(line, points[mine], _TUKEY_ROUNDS, _MIN_SCATTER_PX) if mine.sum() >= 4 else line

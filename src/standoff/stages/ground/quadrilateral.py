@@ -143,7 +143,8 @@ def quadrilateral_from_lines(
     corners, lines = joined
     support, errors = np.empty(4), np.empty((4, 2))
     for side, line in enumerate(lines):
-        support[side], errors[side] = _supported(line, corners[side], corners[(side + 1) % 4], points_px, inlier_px)
+        start, end = corners[side], corners[(side + 1) % 4]
+        support[side], *errors[side] = _supported(line, start, end, points_px, inlier_px)
     if sigma_px is not None:
         covariance = np.tile(np.eye(2) * sigma_px**2, (4, 1, 1))
     else:
@@ -154,25 +155,30 @@ def quadrilateral_from_lines(
 @njit(cache=True)  # type: ignore[untyped-decorator]
 def _supported(
     line: FloatArray, start: FloatArray, end: FloatArray, points_px: FloatArray, inlier_px: float
-) -> tuple[float, tuple[float, float]]:  # pragma: no cover
+) -> tuple[float, float, float]:  # pragma: no cover
     """Return the share of a side's length that has edge points, and its line's offset variances at both ends."""
-    along_x, along_y = end - start
+    along_x, along_y = end[0] - start[0], end[1] - start[1]
     length = np.hypot(along_x, along_y)
-    along_x, along_y = along_x / length, along_y / length
-    offset, position = np.empty(len(points_px)), np.empty(len(points_px))
-    count = 0
-    for x, y in points_px:
-        offset[count] = x * line[0] + y * line[1] + line[2]
-        position[count] = (x - start[0]) * along_x + (y - start[1]) * along_y
-        count += abs(offset[count]) <= inlier_px and 0.0 <= position[count] <= length
-    offset, position = offset[:count], position[:count]
-    support = min(len(np.unique(np.floor(position))) / length, 1.0)
-    if count <= 2 or np.ptp(position) <= 1.0:
-        return support, (inlier_px**2, inlier_px**2)
-    variance = np.mean(offset**2) / max(count / _CORRELATED, 1.0)
-    centre, spread = position.mean(), np.var(position)
-    at_start, at_end = 1.0 + centre**2 / spread, 1.0 + (length - centre) ** 2 / spread
-    return support, (variance * at_start + _MIN_OFFSET_PX**2, variance * at_end + _MIN_OFFSET_PX**2)
+    hit = np.zeros(int(length) + 1, dtype=np.bool_)
+    low, high = length, 0.0
+    count, offset2, position1, position2 = 0, 0.0, 0.0, 0.0
+    for k in range(len(points_px)):
+        offset = points_px[k, 0] * line[0] + points_px[k, 1] * line[1] + line[2]
+        position = ((points_px[k, 0] - start[0]) * along_x + (points_px[k, 1] - start[1]) * along_y) / length
+        if abs(offset) <= inlier_px and 0.0 <= position <= length:
+            hit[int(position)] = True
+            low, high = min(low, position), max(high, position)
+            count, offset2 = count + 1, offset2 + offset**2
+            position1, position2 = position1 + position, position2 + position**2
+    support = min(hit.sum() / length, 1.0)
+    if count <= 2 or high - low <= 1.0:
+        return support, inlier_px**2, inlier_px**2
+    centre = position1 / count
+    spread = position2 / count - centre**2
+    independent = max(count / _CORRELATED, 1.0)
+    variance = offset2 / count / independent
+    at_start, at_end = variance * (1.0 + centre**2 / spread), variance * (1.0 + (length - centre) ** 2 / spread)
+    return support, at_start + _MIN_OFFSET_PX**2, at_end + _MIN_OFFSET_PX**2
 
 
 def _corner_covariances(lines: FloatArray, end_variances: FloatArray) -> FloatArray:

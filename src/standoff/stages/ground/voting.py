@@ -32,12 +32,17 @@ _MAX_TURN_COSINE = 0.98
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
 def _vote(
-    table: npt.NDArray[np.float32], points: FloatArray, towards: IntArray, normals: FloatArray, weight: float
+    table: npt.NDArray[np.float32],
+    points: FloatArray,
+    towards: IntArray,
+    normals: FloatArray,
+    who: BoolArray,
+    weight: float,
 ) -> None:  # pragma: no cover
-    """Add the points' votes to a (directions, offsets) table, each shared between the two nearest offsets."""
+    """Add the votes of those points `who` vote to a (directions, offsets) table, each shared between the two nearest offsets."""
     steps = len(table)
     middle = table.shape[1] // 2
-    for k in range(len(points)):
+    for k in np.flatnonzero(who):
         for step in range(towards[k] - _SPREAD, towards[k] + _SPREAD + 1):
             row = step % steps
             offset = points[k, 0] * normals[row, 0] + points[k, 1] * normals[row, 1] + middle
@@ -99,8 +104,8 @@ def candidate_lines(points: FloatArray, direction: FloatArray, count: int) -> Fl
     normals = np.column_stack([np.cos(angles), np.sin(angles)])
     towards = np.rint(np.arctan2(direction[:, 1], direction[:, 0]) * (_STEPS / (2.0 * np.pi))).astype(np.int64)
     table = np.zeros((_STEPS, 2 * reach + 1), dtype=np.float32)
-    _vote(table, points, towards, normals, 1.0)
     free = np.ones(len(points), dtype=bool)
+    _vote(table, points, towards, normals, free, 1.0)
     lines = []
     for _ in range(count):
         row, column = np.unravel_index(int(table.argmax()), table.shape)
@@ -110,7 +115,7 @@ def candidate_lines(points: FloatArray, direction: FloatArray, count: int) -> Fl
         line = _refined(coarse, points, direction, free)
         lines.append(line)
         claimed = free & agreeing(line, points, direction, _CLAIM_PX, _CLAIM_COSINE)
-        _vote(table, points[claimed], towards[claimed], normals, -1.0)
+        _vote(table, points, towards, normals, claimed, -1.0)
         free &= ~claimed
         table[row, column] = 0.0
     return np.array(lines).reshape(-1, 3)

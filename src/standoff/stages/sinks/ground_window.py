@@ -14,12 +14,13 @@ import numpy.typing as npt
 from standoff.core import homography
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import GroundMap, ImageArray
+from standoff.stages.sinks.ground_shapes import clip_in_front
 
 _GRID = 24
-_CELL_PX = (24, 8)  # the view is foreshortened along y, so the map bends most along it
+_LENS_STEP_PX = 16
 _COARSEST_RATIO = 4.0  # ground metres per pixel over the finest seen: beyond, the rectified picture is a smear
 _RARE_PERCENT = 10.0  # of the picture on either side that the window may leave out
-_OUTSIDE_PX = -1e7  # so far that no pixel between it and a seen one is seen
+_OUTSIDE_PX = -1e4
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,26 +115,59 @@ def rectify(picture: ImageArray, ground: GroundMap, window: GroundWindow, onto: 
     Source:
         Paper, section 5.1, Eq. 5.
     """
-    x_px, y_px = _picture_points(ground, window, picture.shape[1::-1])
-    cv2.remap(picture, x_px, y_px, cv2.INTER_LINEAR, dst=onto, borderMode=cv2.BORDER_TRANSPARENT)
+    window_to_ground = homography.invert(window.ground_to_window)
+    window_to_image = homography.invert(ground.image_to_ground) @ window_to_ground
+    factor = np.array(picture.shape[1::-1]) / ground.image_size_px
+    image_to_picture = np.diag([*factor, 1.0])
+    image_to_picture[:2, 2] = (factor - 1.0) / 2.0
+    behind = _behind_camera(window_to_image, window.size_px)
+    backdrop = onto if behind is None else onto.copy()
+    if ground.camera is None:
+        cv2.warpPerspective(
+            picture,
+            image_to_picture @ window_to_image,
+            window.size_px,
+            dst=onto,
+            flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
+            borderMode=cv2.BORDER_TRANSPARENT,
+        )
+    else:
+        x_px, y_px = _picture_points(ground, window_to_ground, image_to_picture, onto.shape[:2])
+        cv2.remap(picture, x_px, y_px, cv2.INTER_LINEAR, dst=onto, borderMode=cv2.BORDER_TRANSPARENT)
+    if behind is not None:
+        onto[behind] = backdrop[behind]
+
+
+def _behind_camera(window_to_image: FloatArray, size_px: tuple[int, int]) -> BoolArray | None:
+    """Return (h, w) what lies behind the camera's own plane, None when the whole window is in front of it."""
+    width, height = size_px
+    corners = np.array([[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]])
+    depths = corners @ window_to_image[2, :2] + window_to_image[2, 2]
+    if (depths > 0).all():
+        return None
+    front = clip_in_front(window_to_image, corners, 1e-6 * float(np.abs(depths).max()))
+    mask = np.ones((height, width), dtype=np.uint8)
+    if len(front):
+        cv2.fillPoly(mask, [np.round(front).astype(np.int32)], 0)
+    return mask.astype(bool)
 
 
 def _picture_points(
-    ground: GroundMap, window: GroundWindow, picture_size_px: tuple[int, ...]
+    ground: GroundMap, window_to_ground: FloatArray, image_to_picture: FloatArray, shape: tuple[int, ...]
 ) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
-    """Return x and y, (h, w) each, of where every window pixel lies in the picture; far outside where unseen.
+    """Return x and y, (h, w) each, of where every window pixel lies in the picture.
 
-    Only a coarse grid goes through map and lens; between its points both are as good as linear for the eye.
+    Only a coarse grid goes through the lens; between its points the lens is as good as linear for the eye.
     """
-    # cv2.resize has its samples in the middle of the cells, and repeats the outermost: one more all around.
-    (wide, high), (width, height) = _CELL_PX, window.size_px
-    columns, rows = -(-width // wide) + 2, -(-height // high) + 2
-    x, y = np.meshgrid((np.arange(columns) - 0.5) * wide - 0.5, (np.arange(rows) - 0.5) * high - 0.5)
-    window_to_ground = homography.invert(window.ground_to_window)
+    height, width = shape
+    columns, rows = -(-width // _LENS_STEP_PX) + 1, -(-height // _LENS_STEP_PX) + 1
+    x, y = np.meshgrid(np.arange(columns) * _LENS_STEP_PX, np.arange(rows) * _LENS_STEP_PX)
     at_image_px, seen = ground.to_image(homography.apply(window_to_ground, np.column_stack([x.ravel(), y.ravel()]))[0])
-    at_px = (at_image_px + 0.5) * np.array(picture_size_px) / ground.image_size_px - 0.5
-    at_px[~seen] = _OUTSIDE_PX
-    grids = at_px.T.reshape(2, rows, columns).astype(np.float32)
-    dense_x, dense_y = (cv2.resize(grid, (columns * wide, rows * high)) for grid in grids)
-    inside = np.s_[high : high + height, wide : wide + width]
-    return dense_x[inside], dense_y[inside]
+    at_image_px[~seen] = 0.0
+    at_px, _ = homography.apply(image_to_picture, at_image_px)
+    grid = np.column_stack([at_px, seen]).reshape(rows, columns, 3).astype(np.float32)
+    # warpAffine with the step as scale keeps grid points on their pixels; cv2.resize would shift them by half a step.
+    scale = np.array([[_LENS_STEP_PX, 0.0, 0.0], [0.0, _LENS_STEP_PX, 0.0]])
+    dense = cv2.warpAffine(grid, scale, (width, height), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    dense[dense[:, :, 2] < 1.0] = _OUTSIDE_PX
+    return np.ascontiguousarray(dense[:, :, 0]), np.ascontiguousarray(dense[:, :, 1])
