@@ -143,3 +143,9 @@ def test_a_shape_that_cannot_be_is_a_ground_error() -> None:
 
 def test_without_a_ground_every_frame_says_so() -> None:
     assert isinstance(build_ground(Settings()), Unmapped)
+
+
+@pytest.mark.parametrize("example", ["paper.yaml", "pets2009/site.yaml"])
+def test_the_settings_among_the_examples_can_be_used(example: str) -> None:
+    settings = load_settings(Path(__file__).parents[1] / "examples" / example)
+    assert not isinstance(build_ground(settings), Unmapped)

@@ -105,7 +105,13 @@ class GroundSettings(_Section):
     """Where a pixel becomes a metre: a survey, or a reference object, or nothing (no measurement)."""
 
     survey: Annotated[Path | None, Field(description="YAML file of surveyed points, for a fixed camera.")] = None
-    reference: Annotated[ReferenceSettings | None, Field(description="A reference object of known shape.")] = None
+    reference: Annotated[
+        ReferenceSettings | None,
+        Field(
+            description="A reference object: its shape (square_m, rectangle_m, sides_m with diagonal_m, or corners_m), "
+            "where it is (box_px, box_time_s, first_corner_px), and params (method, thresholds)."
+        ),
+    ] = None
     camera: Annotated[Path | None, Field(description="Camera file whose lens distortion is removed first.")] = None
 
     @model_validator(mode="after")

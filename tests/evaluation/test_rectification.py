@@ -52,7 +52,7 @@ def test_the_compiled_ransac_is_the_loops_equal_and_the_result_is_plain(result: 
 
 
 def test_what_no_method_found_is_null_in_the_record() -> None:
-    nothing = MethodScore("paper", "hard", 1, 100.0, 0.0, math.nan, math.nan, math.nan)
+    nothing = MethodScore("paper", "hard", 100.0, 0.0, math.nan, math.nan, 1.0)
     (row,) = RectificationResult(1, 0, (nothing,), 1.0, 50.0, True).to_dict()["scores"]
     assert (row["failed_percent"], row["corner_rmse_px"]) == (100.0, None)
 

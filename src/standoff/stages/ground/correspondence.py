@@ -12,13 +12,11 @@ from numba import njit
 
 from standoff.core.camera import Camera
 from standoff.core.homography import FloatArray
+from standoff.stages.ground.quadrilateral import ORDERS
 from standoff.stages.ground.shape import ReferenceShape
 
 _FOCAL_STEPS = 48
 _DIFFERENCE_PX = 1e-3
-
-_ORDERS = np.array([np.roll(np.arange(4), -turn) for turn in range(4)])
-"""(4, 4) entry k: the corners starting with corner k."""
 
 
 def camera_misfit_px(
@@ -55,7 +53,7 @@ def camera_misfit_px(
         centre, focal_xy = np.array([(width - 1) / 2.0, (height - 1) / 2.0]), np.column_stack([focal, focal])
     else:
         centre, focal_xy = camera.matrix[:2, 2], np.array([[camera.matrix[0, 0], camera.matrix[1, 1]]])
-    orders = (corners_px - centre)[_ORDERS]
+    orders = (corners_px - centre)[ORDERS]
     return np.array([_nearest_seen_px(order, shape.corners_m, focal_xy) for order in orders])
 
 
@@ -79,7 +77,8 @@ def _nearest_seen_px(corners_px: FloatArray, corners_m: FloatArray, focal_xy: Fl
         squared = (yy * skew**2 - 2.0 * xy * skew * stretch + xx * stretch**2) / (xx * yy - xy**2)
         if squared < smallest:
             smallest = squared
-    return np.sqrt(max(smallest, 0.0))
+    misfit: float = np.sqrt(max(smallest, 0.0))
+    return misfit
 
 
 @njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
@@ -102,7 +101,8 @@ def _twice_area(corners: FloatArray, j: int, k: int) -> float:  # pragma: no cov
     """Return that of the triangle of corners 3, j and k, with its sign."""
     jx, jy = corners[j, 0] - corners[3, 0], corners[j, 1] - corners[3, 1]
     kx, ky = corners[k, 0] - corners[3, 0], corners[k, 1] - corners[3, 1]
-    return jx * ky - kx * jy
+    area: float = jx * ky - kx * jy
+    return area
 
 
 @njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
@@ -126,4 +126,4 @@ def turn_from_before(corners_px: FloatArray, before_px: FloatArray) -> int:
     1
     """
     now, then = (points - points.mean(axis=0) for points in (corners_px, before_px))
-    return int((now[_ORDERS] * then).sum(axis=(1, 2)).argmax())
+    return int((now[ORDERS] * then).sum(axis=(1, 2)).argmax())

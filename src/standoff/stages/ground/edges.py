@@ -174,4 +174,5 @@ def _between(values: npt.NDArray[np.float32], x: float, y: float) -> float:  # p
     right, down = x - column, y - row
     above = values[row, column] * (1.0 - right) + values[row, column + 1] * right
     below = values[row + 1, column] * (1.0 - right) + values[row + 1, column + 1] * right
-    return above * (1.0 - down) + below * down
+    value: float = above * (1.0 - down) + below * down
+    return value

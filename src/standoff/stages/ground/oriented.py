@@ -20,7 +20,7 @@ from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import IntArray, NoGroundMap
 from standoff.stages.ground.edges import Edges, Gradients
 from standoff.stages.ground.lines import fit_line_robustly
-from standoff.stages.ground.quadrilateral import NO_QUADRILATERAL, WALKS, crossings, join_lines, walk_around
+from standoff.stages.ground.quadrilateral import NO_QUADRILATERAL, ORDERS, WALKS, crossings, join_lines, walk_around
 from standoff.stages.ground.voting import agreeing, candidate_lines
 
 RIVALS = "two outlines in the reference's box fit equally well"
@@ -120,21 +120,23 @@ def _best_four(
     meet[(np.abs(meet) > reach).any(axis=-1)] = np.nan
     walks = _WALKS[(len(lines) > _WALKS).all(axis=1)]
     corners = np.empty((len(walks), 4, 2))
-    score = _fill_scores(lines, covered_before, meet, size, walks, corners)
-    return _first_believable(walks, corners, score, believable)
+    score = _fill_scores(lines, covered_before, meet, _MIN_SIDE * size.min(), walks, corners)
+    hopeful = score > 0
+    walks, corners, score = walks[hopeful], corners[hopeful], score[hopeful]
+    fill = np.prod(np.ptp(corners, axis=1) / size, axis=1)
+    return _first_believable(walks, corners, score * np.sqrt(np.minimum(fill, 1.0)), believable)
 
 
 def _first_believable(
     walks: IntArray, corners: FloatArray, score: FloatArray, believable: Callable[[FloatArray], bool]
 ) -> IntArray | NoGroundMap:
     """Return the best walk whose corners can be believed, unless another one is as good."""
-    ranking = [k for k in np.argsort(-score, kind="stable")[:_LOOKED_AT] if score[k] > 0]
+    ranking = np.argsort(-score, kind="stable")[:_LOOKED_AT]
     best = next((k for k in ranking if believable(corners[k])), None)
     if best is None:
         return NoGroundMap(NO_QUADRILATERAL)
     rivals = [k for k in ranking if k != best and score[k] >= _RIVAL_SCORE * score[best]]
-    orders = np.array([np.roll(np.arange(4), turn) for turn in range(4)])
-    apart = np.linalg.norm(corners[rivals][:, orders] - corners[best], axis=-1).max(axis=-1).min(axis=-1)
+    apart = np.linalg.norm(corners[rivals][:, ORDERS] - corners[best], axis=-1).max(axis=-1).min(axis=-1)
     if any(believable(corners[k]) for k, distance in zip(rivals, apart, strict=True) if distance > _RIVAL_APART_PX):
         return NoGroundMap(RIVALS)
     chosen: IntArray = walks[best]
@@ -146,42 +148,39 @@ def _fill_scores(
     lines: FloatArray,
     covered_before: FloatArray,
     meet: FloatArray,
-    size: FloatArray,
+    min_side_px: float,
     walks: IntArray,
     corners: FloatArray,
 ) -> FloatArray:  # pragma: no cover
-    """Return (Q,) scores of (Q, 4) walks, 0 where hopeless; put the (Q, 4, 2) corners and the walks in order."""
+    """Return (Q,) scores of (Q, 4) walks, 0 where hopeless; fill in the (Q, 4, 2) corners."""
     scores = np.zeros(len(walks))
-    sides = np.empty(4, dtype=np.int64)
     for k in range(len(walks)):
-        if walk_around(meet, walks[k], corners[k], sides):
-            walks[k] = sides
-            scores[k] = _score(lines, covered_before, sides, corners[k], size)
+        if walk_around(meet, walks[k], corners[k]):
+            scores[k] = _score(lines, covered_before, min_side_px, walks[k], corners[k])
     return scores
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
 def _score(
-    lines: FloatArray, covered_before: FloatArray, sides: IntArray, corners: FloatArray, size: FloatArray
+    lines: FloatArray, covered_before: FloatArray, min_side_px: float, walk: IntArray, corners: FloatArray
 ) -> float:  # pragma: no cover
     """Return pixels of outline that edges support, less what is bare and what runs on beyond a corner."""
-    centre_x, centre_y = corners[:, 0].mean(), corners[:, 1].mean()
+    centre_x = (corners[0, 0] + corners[1, 0] + corners[2, 0] + corners[3, 0]) / 4.0
+    centre_y = (corners[0, 1] + corners[1, 1] + corners[2, 1] + corners[3, 1]) / 4.0
     score, bright_inside = 0.0, 0
     for k in range(4):
-        a, b, c = lines[sides[k], 0], lines[sides[k], 1], lines[sides[k], 2]
+        a, b, c = lines[walk[k], 0], lines[walk[k], 1], lines[walk[k], 2]
         start, end = corners[k, 1] * a - corners[k, 0] * b, corners[k - 3, 1] * a - corners[k - 3, 0] * b
         start, end = min(start, end), max(start, end)
-        before, length = covered_before[sides[k]], end - start
+        before, length = covered_before[walk[k]], end - start
         covered = _covered(before, start, end)
-        if length < _MIN_SIDE * size.min() or covered < _MIN_COVERED * length:
+        if length < min_side_px or covered < _MIN_COVERED * length:
             return 0.0
         beyond = _covered(before, start - _BEYOND_TO_PX, start - _BEYOND_FROM_PX)
         beyond += _covered(before, end + _BEYOND_FROM_PX, end + _BEYOND_TO_PX)
         score += covered - _BARE_COST * (length - covered) - _BEYOND_COST * beyond
         bright_inside += centre_x * a + centre_y * b + c > 0
-    polarity = 1.0 if bright_inside in (0, 4) else _MIXED_POLARITY
-    fill = (np.ptp(corners[:, 0]) / size[0]) * (np.ptp(corners[:, 1]) / size[1])
-    return score * polarity * np.sqrt(min(fill, 1.0))
+    return score if bright_inside == 0 or bright_inside == 4 else score * _MIXED_POLARITY
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
@@ -189,7 +188,8 @@ def _covered(before: FloatArray, low: float, high: float) -> float:  # pragma: n
     """Return how many of a line's pixels from `low` to `high` are covered."""
     most = len(before) - 1
     first, last = int(np.rint(low)) + most // 2, int(np.rint(high)) + most // 2
-    return before[min(max(last, 0), most)] - before[min(max(first, 0), most)]
+    count: float = before[min(max(last, 0), most)] - before[min(max(first, 0), most)]
+    return count
 
 
 def _refitted(lines: FloatArray, points: FloatArray, direction: FloatArray) -> FloatArray | None:

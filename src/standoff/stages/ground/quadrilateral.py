@@ -19,8 +19,11 @@ OUTSIDE_BOX = "a corner lies outside the reference's box"
 TOO_SMALL = "the quadrilateral is too small for the reference's box"
 UNSUPPORTED = "a side of the quadrilateral has too few edge points"
 
-WALKS = ((0, 1, 2, 3), (0, 1, 3, 2), (0, 2, 1, 3))
+WALKS = np.array([[0, 1, 2, 3], [0, 1, 3, 2], [0, 2, 1, 3]])
 """The three ways to walk around four lines."""
+
+ORDERS = (np.arange(4)[:, None] + np.arange(4)) % 4
+"""(4, 4) row k: the corners starting with corner k."""
 
 _MIN_SINE = 0.05
 """Neighbouring sides meet at three degrees or more; a flatter crossing is not an anchor point."""
@@ -69,10 +72,10 @@ def join_lines(lines: FloatArray) -> tuple[FloatArray, FloatArray] | None:
     [(0.0, 0.0), (0.0, 3.0), (4.0, 0.0), (4.0, 3.0)]
     """
     meet = crossings(lines)
-    corners, sides = np.empty((4, 2)), np.empty(4, dtype=np.int64)
-    for walk in WALKS:
-        if walk_around(meet, walk, corners, sides):
-            return corners, lines[sides]
+    corners = np.empty((4, 2))
+    for walk in WALKS.copy():
+        if walk_around(meet, walk, corners):
+            return corners, lines[walk]
     return None
 
 
@@ -91,22 +94,15 @@ def crossings(lines: FloatArray) -> FloatArray:  # pragma: no cover
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
-def walk_around(
-    meet: FloatArray, walk: tuple[int, int, int, int], corners: FloatArray, sides: IntArray
-) -> bool:  # pragma: no cover
-    """Write down the quadrilateral that one walk along four lines makes.
+def walk_around(meet: FloatArray, walk: IntArray, corners: FloatArray) -> bool:  # pragma: no cover
+    """Find the quadrilateral that one walk along four lines makes, and whether it is convex.
 
     Args:
         meet: (M, M, 2) from `crossings`.
-        walk: The lines.
+        walk: (4,) lines; turned around in place if need be, so that side k lies on line `walk[k]`.
         corners: (4, 2) to be filled, counter-clockwise as seen.
-        sides: (4,) to be filled: side k lies on line `sides[k]`.
-
-    Returns:
-        Whether it is convex.
     """
     for k in range(4):
-        sides[k] = walk[k]
         corners[k, 0], corners[k, 1] = meet[walk[k - 1], walk[k], 0], meet[walk[k - 1], walk[k], 1]
     left, right = 0, 0
     for k in range(4):
@@ -118,7 +114,7 @@ def walk_around(
         # Walked the other way, side k runs from old corner -k to old corner -k - 1: along old line -k - 1.
         for axis in range(2):
             corners[1, axis], corners[3, axis] = corners[3, axis], corners[1, axis]
-        sides[0], sides[1], sides[2], sides[3] = sides[3], sides[2], sides[1], sides[0]
+        walk[0], walk[1], walk[2], walk[3] = walk[3], walk[2], walk[1], walk[0]
     return left == 4 or right == 4
 
 

@@ -177,15 +177,14 @@ class ReferenceGround:
 
     def _detected_box(self, time_s: float, detections: Detections) -> FloatArray | None:
         """Return the surest detection; while the last box is fresh, of those near it: there may be two references."""
-        seen = detections[np.isin(detections.class_id, class_ids(Role.REFERENCE))]
-        seen = seen[seen.score >= self._params.min_score]
+        seen = np.isin(detections.class_id, class_ids(Role.REFERENCE)) & (detections.score >= self._params.min_score)
         if self._box is not None and time_s - self._known_s <= self._params.memory_s:
             centre, diagonal = _centre_and_diagonal(self._box)
-            centres = (seen.xyxy_px[:, :2] + seen.xyxy_px[:, 2:]) / 2.0
-            seen = seen[np.linalg.norm(centres - centre, axis=1) <= diagonal]
-        if not len(seen):
+            centres = (detections.xyxy_px[:, :2] + detections.xyxy_px[:, 2:]) / 2.0
+            seen &= np.linalg.norm(centres - centre, axis=1) <= diagonal
+        if not seen.any():
             return None
-        box: FloatArray = seen.xyxy_px[int(seen.score.argmax())]
+        box: FloatArray = detections.xyxy_px[int(np.where(seen, detections.score, -1.0).argmax())]
         return box
 
     def _misfit(self, corners_px: FloatArray) -> tuple[FloatArray, float]:

@@ -36,13 +36,13 @@ def _vote(
     points: FloatArray,
     towards: IntArray,
     normals: FloatArray,
-    who: BoolArray,
+    voting: BoolArray,
     weight: float,
 ) -> None:  # pragma: no cover
-    """Add the votes of those points `who` vote to a (directions, offsets) table, each shared between the two nearest offsets."""
+    """Add some points' votes to a (directions, offsets) table, each shared between the two nearest offsets."""
     steps = len(table)
     middle = table.shape[1] // 2
-    for k in np.flatnonzero(who):
+    for k in np.flatnonzero(voting):
         for step in range(towards[k] - _SPREAD, towards[k] + _SPREAD + 1):
             row = step % steps
             offset = points[k, 0] * normals[row, 0] + points[k, 1] * normals[row, 1] + middle

@@ -63,7 +63,7 @@ def circle_outlines_px(ground: GroundMap, centres_m: FloatArray, radii_m: FloatA
     depths = _depths(ground_to_image, centres_m)
     nearest = _NEAREST_SHARE * depths
     rings_m = centres_m[:, None] + radii_m[:, None, None] * _RING
-    whole = (_depths(ground_to_image, rings_m) >= nearest[:, None]).all(axis=1)
+    whole: BoolArray = np.asarray((_depths(ground_to_image, rings_m) >= nearest[:, None]).all(axis=1))
     outlines_px = ground.to_image(rings_m.reshape(-1, 2))[0].reshape(rings_m.shape)
     outlines: list[list[FloatArray]] = []
     for i in range(len(centres_m)):
