@@ -49,7 +49,7 @@ def test_paths_in_a_settings_file_are_relative_to_the_file(tmp_path: Path) -> No
 def test_the_command_line_wins_over_the_environment_and_that_over_the_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path = write(tmp_path, "every: 2\ndetect_every: 2\ntrack: {max_coast_s: 3.0, confirm_hits: 5}\n")
+    path = write(tmp_path, "every: 2\ndetect_every: 2\ntrack: {max_coast_s: 3.0, max_lost_s: 3.0, confirm_hits: 5}\n")
     monkeypatch.setenv("STANDOFF_DETECT_EVERY", "4")
     monkeypatch.setenv("STANDOFF_EVERY", "4")
     monkeypatch.setenv("STANDOFF_TRACK__MAX_COAST_S", "2.5")
@@ -61,7 +61,7 @@ def test_the_command_line_wins_over_the_environment_and_that_over_the_file(
 @pytest.mark.parametrize(
     ("text", "telling"),
     [
-        ("evry: 2\n", "evry"),
+        ("evry: 2\n", "did you mean every?"),
         ("track: {max_cost_s: 2}\n", "did you mean max_coast_s?"),
         ("video: {draw: {circle: false}}\n", "video.draw has no setting 'circle'; did you mean circles?"),
         ("track: {high_score: 1.5}\n", "less than or equal to 1"),
@@ -109,7 +109,7 @@ def test_every_stage_can_be_replaced_by_name(tmp_path: Path) -> None:
 @pytest.mark.parametrize("factory", ["no_such_module:Thing", "test_config:NoSuchThing"])
 def test_a_replacement_that_is_not_there_is_one_line(factory: str) -> None:
     settings = load_settings(overrides={"replace": {"detect": {"factory": factory}}})
-    with pytest.raises(ConfigError, match="to make detect"):
+    with pytest.raises(ConfigError, match="to be importable"):
         build_pipeline(settings, frames=())
 
 
@@ -149,3 +149,27 @@ def test_without_a_ground_every_frame_says_so() -> None:
 def test_the_settings_among_the_examples_can_be_used(example: str) -> None:
     settings = load_settings(Path(__file__).parents[1] / "examples" / example)
     assert not isinstance(build_ground(settings), Unmapped)
+
+
+class PeopleOnly(Blind):
+    """A model that knows people only."""
+
+    description = {"class_map": {"person": "worker"}}  # noqa: RUF012
+
+
+def people_only(**more: object) -> Settings:
+    return load_settings(overrides={"replace": {"detect": {"factory": "test_config:PeopleOnly"}}, **more})
+
+
+def test_a_model_that_can_never_see_one_side_of_a_pair_is_refused() -> None:
+    with pytest.raises(ConfigError, match="without any equipment"):
+        build_pipeline(people_only(), frames=())
+    build_pipeline(people_only(proximity={"pairs": [["person", "person"]]}), frames=())
+
+
+def test_a_reference_without_a_box_needs_a_model_that_knows_it() -> None:
+    pairs = {"pairs": [["person", "person"]]}
+    with pytest.raises(ConfigError, match="neither a box nor a model"):
+        build_pipeline(people_only(proximity=pairs, ground={"reference": {"square_m": 2.0}}), frames=())
+    boxed = {"reference": {"square_m": 2.0, "box_px": [1, 2, 30, 40]}}
+    build_pipeline(people_only(proximity=pairs, ground=boxed), frames=())

@@ -16,6 +16,7 @@ from typing import Any
 
 from standoff.config import Settings, build_pipeline, build_replacement, resolved
 from standoff.core.errors import OutputError
+from standoff.core.protocols import Ground
 from standoff.core.types import FrameResult, Sink
 from standoff.pipeline import Pipeline
 from standoff.stages.frames import Source, open_source
@@ -80,6 +81,7 @@ def open_run(source: Path | str, out: Path | str, settings: Settings, *, overwri
         "source": frames.description,
         "model": getattr(pipeline.detector, "description", None),
         "ground": getattr(pipeline.ground, "description", None),
+        "warnings": ground_warnings(pipeline.ground),
     }
     extra = {name: build_replacement(name, replacement) for name, replacement in settings.extra_outputs.items()}
     folder = prepare_output(out, overwrite=overwrite)
@@ -87,6 +89,11 @@ def open_run(source: Path | str, out: Path | str, settings: Settings, *, overwri
     # The record last, so that it times all others.
     pipeline.sinks = {**own, **extra, "record": RecordSink(folder / RECORD, descriptions)}
     return Run(frames, pipeline, folder)
+
+
+def ground_warnings(ground: Ground) -> list[str]:
+    """Return what a ground stage says of its own set-up: a survey point that disagrees, a mirrored frame."""
+    return list(getattr(ground, "description", {}).get("warnings", ()))
 
 
 def _refuse_own_source(source: Path, out: Path) -> None:

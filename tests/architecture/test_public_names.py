@@ -13,7 +13,7 @@ PUBLIC_NAMES = {
     "standoff.stages.detect": {"DEFAULT_CLASS_MAP", "DetectParams", "OnnxDetector", "available_providers"},
     "standoff.stages.track": {"TrackParams", "Tracker"},
     "standoff.stages.locate": {"LocateParams", "Locator"},
-    "standoff.stages.proximity": {"ProximityMeter", "ProximityParams"},
+    "standoff.stages.proximity": {"ProximityMeter", "ProximityParams", "side_classes"},
     "standoff.stages.hazard": {"HazardMonitor", "HazardParams"},
 }
 

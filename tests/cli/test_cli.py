@@ -277,7 +277,7 @@ def test_an_output_of_ones_own_that_cannot_be_made_leaves_the_folder_as_it_was(
     settings = yaml.safe_load(site.read_text()) | {"extra_outputs": {"siren": {"factory": factory}}}
     site.write_text(yaml.safe_dump(settings), encoding="utf-8")
     code, _, err = call("run", video, "--config", site, "--out", tmp_path / "out", "--overwrite")
-    assert (code, err.count("\n"), "to make siren" in err) == (2, 1, True)
+    assert (code, err.count("\n"), f"expected {factory} to" in err) == (2, 1, True)
     assert (tmp_path / "out" / "run.json").read_bytes() == before
 
 

@@ -78,12 +78,17 @@ def show(
 @app.command()
 def check(file: Annotated[Path, typer.Argument(help="Settings, YAML.", show_default=False)]) -> None:
     """Check a settings file and everything that it points to: model, survey, camera, shapes."""
-    from standoff.config import STAGE_NAMES, build_stage, load_settings
+    from standoff.config import STAGE_NAMES, build_stage, import_factory, load_settings
+    from standoff.monitor import ground_warnings
 
     settings = load_settings(file)
     for name in STAGE_NAMES:
         if name == "detect" and settings.model is None and name not in settings.replace:
             typer.echo(f"{file} names no model: pass --model to run.")
         else:
-            build_stage(name, settings)
+            stage = build_stage(name, settings)
+            for warning in ground_warnings(stage) if name == "ground" else ():
+                typer.echo(f"standoff: warning: {warning}", err=True)
+    for replacement in settings.extra_outputs.values():
+        import_factory(replacement)
     typer.echo(f"{file}: all settings are valid, and the files that they name can be used.")

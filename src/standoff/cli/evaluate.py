@@ -125,6 +125,6 @@ def _frame_range(text: str | None) -> tuple[int, int] | None:
     if text is None:
         return None
     first, sign, last = text.partition("-")
-    if not (sign and first.isdecimal() and last.isdecimal()):
+    if not (sign and first.isdecimal() and last.isdecimal() and 0 < int(first) <= int(last)):
         raise ConfigError(expected="--frames FIRST-LAST", found=repr(text), fix="write for example --frames 1-219")
     return int(first), int(last)

@@ -87,7 +87,7 @@ def run(
 ) -> None:
     """Monitor a video: distances in metres, hazards, an annotated film and a report."""
     from standoff.config import load_settings
-    from standoff.monitor import RECORD, open_run
+    from standoff.monitor import RECORD, ground_warnings, open_run
 
     plain = {
         "model": model,
@@ -96,12 +96,14 @@ def run(
         "every": every,
         "fps": fps,
         "detect_every": detect_every,
-        "outputs": tuple(filter(None, outputs.split(","))) if outputs is not None else None,
+        "outputs": tuple(filter(None, map(str.strip, outputs.split(",")))) if outputs is not None else None,
     }
     overrides: dict[str, Any] = {name: value for name, value in plain.items() if value is not None}
     if ground_overrides := _ground_overrides(ground, reference_box, camera):
         overrides["ground"] = ground_overrides
     opened = open_run(source, out, load_settings(config, overrides), overwrite=overwrite)
+    for warning in ground_warnings(opened.pipeline.ground):
+        typer.echo(f"standoff: warning: {warning}", err=True)
     try:
         _watch(opened, quiet=quiet)
     except StandoffError:
@@ -172,5 +174,5 @@ def _status(record_file: Path) -> int:
         return 1
     unmeasured = record["counts"]["frames_with_map"] == 0
     if unmeasured:
-        typer.echo("standoff: no frame could be measured; the reasons are above and in run.json.", err=True)
+        typer.echo("standoff: no frame could be measured; run.json has the reasons.", err=True)
     return int(unmeasured or bool(record["sink_errors"]))

@@ -128,7 +128,7 @@ def canny(gradients: Gradients, high: float, low: float) -> Edges:
         return Edges(np.zeros((0, 2)), np.zeros((0, 2)))
     fixed_x, fixed_y = (np.rint(component * _FIXED_POINT).astype(np.int16) for component in (dx, dy))
     thin = cv2.Canny(fixed_x, fixed_y, low * largest, high * largest, L2gradient=True)[1:-1, 1:-1]
-    rows, columns = np.nonzero(thin)
+    rows, columns = np.nonzero(thin > 0)
     rows, columns = rows + 1, columns + 1
     points = np.column_stack([columns + gradients.left_px, rows + gradients.top_px]).astype(np.float64)
     return Edges(points, np.column_stack([dx[rows, columns], dy[rows, columns]]).astype(np.float64))

@@ -44,7 +44,7 @@ def _vote(
     middle = table.shape[1] // 2
     for k in np.flatnonzero(voting):
         for step in range(towards[k] - _SPREAD, towards[k] + _SPREAD + 1):
-            row = step % steps
+            row = step if step >= 0 else step + steps
             offset = points[k, 0] * normals[row, 0] + points[k, 1] * normals[row, 1] + middle
             column = int(offset)
             share = offset - column

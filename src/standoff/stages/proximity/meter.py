@@ -117,12 +117,25 @@ def _watched_classes(pairs: tuple[tuple[str, str], ...]) -> BoolArray:
     return watched
 
 
+def side_classes(side: str) -> frozenset[str]:
+    """Return the names of the classes that a side of a configured pair stands for.
+
+    Args:
+        side: A class name, "person", "equipment", or "any" for both roles.
+
+    >>> sorted(side_classes("person"))
+    ['worker']
+    """
+    if side in CLASS_BY_NAME:
+        return frozenset({side})
+    roles = {Role.PERSON, Role.EQUIPMENT} if side == "any" else {Role(side)}
+    return frozenset(site_class.name for site_class in CLASSES if site_class.role in roles)
+
+
 def _members(side: str) -> BoolArray:
     """Return (C,) which classes a side of a configured pair stands for."""
-    if side in CLASS_BY_NAME:
-        return np.array([site_class.name == side for site_class in CLASSES])
-    roles = {Role.PERSON, Role.EQUIPMENT} if side == "any" else {Role(side)}
-    return np.array([site_class.role in roles for site_class in CLASSES])
+    names = side_classes(side)
+    return np.array([site_class.name in names for site_class in CLASSES])
 
 
 def _distance_sigma(

@@ -22,6 +22,21 @@ from standoff.stages.sinks.scene import worse
 _LIBRARIES = ("numpy", "scipy", "numba", "opencv-python-headless", "onnxruntime", "av", "pyarrow")
 
 
+_COUNTED = (
+    "frames",
+    "detected_frames",
+    "frames_with_map",
+    "detections",
+    "positions",
+    "valid_positions",
+    "distances",
+    "measured_distances",
+    "filtered_distances",
+    "tracks",
+    "pairs",
+)
+
+
 class RecordSink:
     """Write the record at the start, with status "running", and again at the end.
 
@@ -37,7 +52,7 @@ class RecordSink:
         self._path = Path(path)
         self._head = {"started_at": datetime.now(UTC), "versions": library_versions(), **descriptions}
         self._started = time.monotonic()
-        self._counts: Counter[str] = Counter()
+        self._counts: Counter[str] = Counter(dict.fromkeys(_COUNTED, 0))
         self._no_map: Counter[str] = Counter()
         self._map_methods: Counter[str] = Counter()
         self._invalid: Counter[str] = Counter()

@@ -90,7 +90,8 @@ def render(summary: RunSummary, outcome: Outcome, descriptions: Mapping[str, Any
         pair_charts=Markup(pair_charts(summary, warning_gap_m)),
         plan_chart=Markup(plan_chart(summary)),
         moments=[(moment, _data_uri(moment.jpeg())) for moment in shown],
-        descriptions={heading: list(_flat(plain(value))) for heading, value in descriptions.items()},
+        warnings=descriptions.get("warnings", ()),
+        descriptions={heading: list(_flat(plain(value))) for heading, value in descriptions.items() if value},
         distance_text=distance_text,
     )
 

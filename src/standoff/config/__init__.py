@@ -1,0 +1,32 @@
+"""One Settings tree, and the pipeline that it describes.
+
+Every stage's own settings are a plain dataclass beside the stage; this package is the only one that knows pydantic,
+which checks their bounds.
+"""
+
+from standoff.config.build import build_ground, build_pipeline, build_replacement, build_stage, import_factory
+from standoff.config.load import load_settings, resolved
+from standoff.config.settings import (
+    OUTPUT_NAMES,
+    STAGE_NAMES,
+    GroundSettings,
+    ReferenceSettings,
+    Replacement,
+    Settings,
+)
+
+__all__ = [
+    "OUTPUT_NAMES",
+    "STAGE_NAMES",
+    "GroundSettings",
+    "ReferenceSettings",
+    "Replacement",
+    "Settings",
+    "build_ground",
+    "build_pipeline",
+    "build_replacement",
+    "build_stage",
+    "import_factory",
+    "load_settings",
+    "resolved",
+]

@@ -1,0 +1,163 @@
+"""Make the stages and the pipeline that the settings describe."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+from standoff.config.settings import Replacement, Settings, StageName
+from standoff.core.camera import Camera
+from standoff.core.errors import ConfigError
+from standoff.core.protocols import Detector, Ground
+from standoff.core.types import Frame, Sink
+from standoff.pipeline import Pipeline
+from standoff.stages.detect import OnnxDetector
+from standoff.stages.ground import ReferenceGround, Unmapped, load_camera, load_survey
+from standoff.stages.hazard import HazardMonitor
+from standoff.stages.locate import Locator
+from standoff.stages.proximity import ProximityMeter, side_classes
+from standoff.stages.track import Tracker
+
+
+def import_factory(replacement: Replacement) -> Callable[..., Any]:
+    """Import what makes a stage or a sink of the user's own.
+
+    Raises:
+        ConfigError: It cannot be imported.
+    """
+    module_name, _, attribute = replacement.factory.partition(":")
+    try:
+        factory: Callable[..., Any] = getattr(importlib.import_module(module_name), attribute)
+    except (ImportError, AttributeError) as error:
+        raise ConfigError(
+            expected=f"{replacement.factory} to be importable",
+            found=str(error),
+            fix="install its package or add its folder to PYTHONPATH, and check both names",
+        ) from error
+    return factory
+
+
+def build_replacement(name: str, replacement: Replacement) -> Any:  # noqa: ANN401
+    """Make a stage or a sink of the user's own.
+
+    Raises:
+        ConfigError: It cannot be imported, or does not take the options.
+    """
+    factory = import_factory(replacement)
+    try:
+        return factory(**replacement.options)
+    except (TypeError, ValueError, OSError) as error:
+        raise ConfigError(
+            expected=f"{replacement.factory} to make {name} of its options",
+            found=str(error),
+            fix="correct the options",
+        ) from error
+
+
+def build_detector(settings: Settings) -> Detector:
+    """Load the configured model.
+
+    Raises:
+        ConfigError: No model is configured.
+        ModelError: It cannot be used.
+    """
+    if settings.model is None:
+        raise ConfigError(
+            expected="a detector",
+            found="none (no --model, no `model:` in the settings)",
+            fix="pass --model model.onnx; `standoff export` makes one from Darknet weights",
+        )
+    return OnnxDetector(settings.model, settings.detect)
+
+
+def build_ground(settings: Settings) -> Ground:
+    """Make the configured ground stage.
+
+    Raises:
+        GroundError: Its points, shape or camera file cannot be used.
+    """
+    camera: Camera | None = load_camera(settings.ground.camera) if settings.ground.camera else None
+    if settings.ground.survey is not None:
+        return load_survey(settings.ground.survey, camera=camera)
+    reference = settings.ground.reference
+    if reference is None:
+        return Unmapped()
+    return ReferenceGround(
+        reference.shape(),
+        reference.params,
+        box_xyxy_px=reference.box_px,
+        box_time_s=reference.box_time_s,
+        first_corner_px=reference.first_corner_px,
+        camera=camera,
+    )
+
+
+_MAKERS: Mapping[StageName, Callable[[Settings], Any]] = {
+    "detect": build_detector,
+    "ground": build_ground,
+    "track": lambda settings: Tracker(settings.track),
+    "locate": lambda settings: Locator(settings.locate),
+    "proximity": lambda settings: ProximityMeter(settings.proximity),
+    "hazard": lambda settings: HazardMonitor(settings.hazard),
+}
+
+
+def build_stage(name: StageName, settings: Settings) -> Any:  # noqa: ANN401
+    """Make one stage, standoff's own or the configured replacement.
+
+    Raises:
+        StandoffError: Something that the settings name cannot be used.
+    """
+    if name in settings.replace:
+        return build_replacement(name, settings.replace[name])
+    return _MAKERS[name](settings)
+
+
+def _check_visible(settings: Settings, detector: Detector) -> None:
+    """Raise ConfigError where the model can never show what is to be measured: its silence would read as safety."""
+    class_map = getattr(detector, "description", {}).get("class_map")
+    if class_map is None:
+        return
+    visible = frozenset(class_map.values())
+    for pair in settings.proximity.pairs:
+        for side in pair:
+            if not side_classes(side) & visible:
+                raise ConfigError(
+                    expected=f"a model that can see both sides of proximity.pairs {list(pair)}",
+                    found=f"one without any {side} (its labels give {', '.join(sorted(visible))})",
+                    fix="choose another model, map its labels with detect.class_map, or change proximity.pairs",
+                )
+    reference = settings.ground.reference
+    if reference is not None and reference.box_px is None and "reference" not in visible:
+        raise ConfigError(
+            expected="to know where the reference object is",
+            found="neither a box nor a model with a class `reference`",
+            fix="give --reference-box left,top,right,bottom, or ground.reference.box_px",
+        )
+
+
+def build_pipeline(settings: Settings, frames: Iterable[Frame], sinks: Mapping[str, Sink] | None = None) -> Pipeline:
+    """Make one stream's pipeline; all state belongs to the objects made here.
+
+    Args:
+        settings: What to build.
+        frames: The source.
+        sinks: Outputs by name, in the order in which they get each frame.
+
+    Raises:
+        StandoffError: A model, survey, camera or replacement that cannot be used.
+    """
+    detector = build_stage("detect", settings)
+    _check_visible(settings, detector)
+    return Pipeline(
+        frames=frames,
+        detector=detector,
+        ground=build_stage("ground", settings),
+        tracker=build_stage("track", settings),
+        locator=build_stage("locate", settings),
+        proximity=build_stage("proximity", settings),
+        hazard=build_stage("hazard", settings),
+        sinks=dict(sinks or {}),
+        detect_every=settings.detect_every,
+    )

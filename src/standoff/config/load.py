@@ -1,0 +1,104 @@
+"""Read settings. Sources, strongest first: the command line, the environment, the YAML file, the defaults."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import yaml
+from pydantic import TypeAdapter, ValidationError
+from pydantic_core import ErrorDetails
+from pydantic_settings import BaseSettings, InitSettingsSource, PydanticBaseSettingsSource
+
+from standoff.config.settings import Settings
+from standoff.core.errors import ConfigError
+
+
+def _clause(error: ErrorDetails) -> str:
+    """Return one pydantic error as `where: what (found ...)`."""
+    where = ".".join(str(part) for part in error["loc"])
+    message = error["msg"].removeprefix("Value error, ")
+    found = "" if isinstance(error["input"], (dict, list)) else f" (found {error['input']!r})"
+    return f"{where}: {message}{found}" if where else message
+
+
+def _config_error(origin: str, error: ValidationError) -> ConfigError:
+    clauses = [_clause(one) for one in error.errors()]
+    more = f"; and {len(clauses) - 3} more" if len(clauses) > 3 else ""
+    return ConfigError(
+        expected=f"valid settings in {origin}",
+        found="; ".join(clauses[:3]) + more,
+        fix="correct them; `standoff config show` lists every setting with its meaning and bounds",
+    )
+
+
+def _read_yaml(path: Path) -> dict[str, Any]:
+    try:
+        loaded = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ConfigError(
+            expected=f"a readable settings file at {path}", found=str(error.strerror), fix="check the path"
+        ) from error
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise ConfigError(expected=f"YAML in {path}", found=str(error), fix="correct the file") from error
+    if loaded is None:
+        return {}
+    if not isinstance(loaded, dict):
+        raise ConfigError(
+            expected=f"settings by name in {path}", found=type(loaded).__name__, fix="write `name: value` lines"
+        )
+    return loaded
+
+
+def _anchor_paths(settings: dict[str, Any], folder: Path) -> None:
+    """Make paths absolute: those of a file are relative to it, not to wherever the program was started."""
+    ground = settings.get("ground")
+    for section, name in ((settings, "model"), (ground, "survey"), (ground, "camera")):
+        if isinstance(section, dict) and isinstance(section.get(name), str):
+            section[name] = str((folder / section[name]).resolve())
+
+
+def load_settings(path: Path | str | None = None, overrides: Mapping[str, Any] | None = None) -> Settings:
+    """Read the settings file, the environment and the overrides into one checked tree.
+
+    Args:
+        path: YAML file; paths in it are relative to it. None: defaults.
+        overrides: Nested settings that win over everything else, as the command line gives them.
+
+    Raises:
+        ConfigError: A file that cannot be read, a name that does not exist, a value out of bounds.
+    """
+    from_file: dict[str, Any] = {}
+    if path is not None:
+        path = Path(path)
+        from_file = _read_yaml(path)
+        _anchor_paths(from_file, path.parent)
+
+    from_caller = copy.deepcopy(dict(overrides or {}))
+    _anchor_paths(from_caller, Path.cwd())
+
+    class _FileSettings(Settings):
+        @classmethod
+        def settings_customise_sources(
+            cls,
+            settings_cls: type[BaseSettings],
+            init_settings: PydanticBaseSettingsSource,
+            env_settings: PydanticBaseSettingsSource,
+            dotenv_settings: PydanticBaseSettingsSource,
+            file_secret_settings: PydanticBaseSettingsSource,
+        ) -> tuple[PydanticBaseSettingsSource, ...]:
+            return init_settings, env_settings, InitSettingsSource(settings_cls, from_file)
+
+    try:
+        return _FileSettings(**from_caller)
+    except ValidationError as error:
+        raise _config_error(str(path) if path else "the command line and environment", error) from error
+
+
+def resolved(settings: Settings) -> dict[str, Any]:
+    """Return the settings as plain JSON values, every default filled in."""
+    plain = TypeAdapter(Settings).dump_python(settings, mode="json")
+    assert isinstance(plain, dict)
+    return plain

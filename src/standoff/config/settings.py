@@ -1,0 +1,172 @@
+"""The Settings tree: what a run depends on, with bounds and meanings."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Mapping
+from dataclasses import is_dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal, get_type_hints
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic_settings import BaseSettings, SettingsConfigDict
+
+from standoff.stages.detect import DetectParams
+from standoff.stages.ground import ReferenceParams, ReferenceShape
+from standoff.stages.hazard import HazardParams
+from standoff.stages.locate import LocateParams
+from standoff.stages.proximity import ProximityParams
+from standoff.stages.sinks import ReportParams, TableParams, VideoParams
+from standoff.stages.track import TrackParams
+
+Point = tuple[float, float]
+StageName = Literal["detect", "ground", "track", "locate", "proximity", "hazard"]
+STAGE_NAMES: tuple[StageName, ...] = ("detect", "ground", "track", "locate", "proximity", "hazard")
+OutputName = Literal["tracks", "proximity", "frames", "hazards", "video", "report"]
+OUTPUT_NAMES: tuple[OutputName, ...] = ("tracks", "proximity", "frames", "hazards", "video", "report")
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class ReferenceSettings(_Section):
+    """The reference object: its true shape in one of four ways, and where to look for it."""
+
+    square_m: Annotated[float | None, Field(gt=0, description="Side of a square; m.")] = None
+    rectangle_m: Annotated[Point | None, Field(description="Length and width of a rectangle; m.")] = None
+    sides_m: Annotated[
+        tuple[float, float, float, float] | None,
+        Field(description="Four sides in order, counter-clockwise seen from above; m. Needs diagonal_m."),
+    ] = None
+    diagonal_m: Annotated[
+        float | None, Field(gt=0, description="From the first corner to the third; m. Goes with sides_m.")
+    ] = None
+    corners_m: Annotated[
+        tuple[Point, Point, Point, Point] | None,
+        Field(description="Four corners, counter-clockwise seen from above, in the site frame; m."),
+    ] = None
+    box_px: Annotated[
+        tuple[float, float, float, float] | None,
+        Field(description="Its box in one frame: left, top, right, bottom; px. Absent: the detector finds it."),
+    ] = None
+    box_time_s: Annotated[
+        float | None, Field(ge=0, description="The time of that frame; s. Absent: the first frame that is read.")
+    ] = None
+    first_corner_px: Annotated[
+        Point | None, Field(description="Picture point nearest the first corner in that frame; px.")
+    ] = None
+    params: Annotated[ReferenceParams, Field(description="How its corners are found.")] = ReferenceParams()
+
+    @model_validator(mode="after")
+    def _one_shape(self) -> ReferenceSettings:
+        given = [n for n in ("square_m", "rectangle_m", "sides_m", "corners_m") if getattr(self, n) is not None]
+        if len(given) != 1:
+            raise ValueError(
+                f"give one of square_m, rectangle_m, sides_m, corners_m (there are {', '.join(given) or 'none'})"
+            )
+        if (self.sides_m is None) != (self.diagonal_m is None):
+            raise ValueError("sides_m and diagonal_m go together")
+        return self
+
+    def shape(self) -> ReferenceShape:
+        """Return the shape in metres."""
+        if self.square_m is not None:
+            return ReferenceShape.square(self.square_m)
+        if self.rectangle_m is not None:
+            return ReferenceShape.rectangle(*self.rectangle_m)
+        if self.sides_m is not None and self.diagonal_m is not None:
+            return ReferenceShape.from_sides(self.sides_m, self.diagonal_m)
+        assert self.corners_m is not None, "checked in _one_shape"
+        return ReferenceShape.from_corners(self.corners_m)
+
+
+class GroundSettings(_Section):
+    """Where a pixel becomes a metre: a survey, or a reference object, or nothing (no measurement)."""
+
+    survey: Annotated[Path | None, Field(description="YAML file of surveyed points, for a fixed camera.")] = None
+    reference: Annotated[
+        ReferenceSettings | None,
+        Field(
+            description="A reference object: its shape (square_m, rectangle_m, sides_m with diagonal_m, or corners_m), "
+            "where it is (box_px, box_time_s, first_corner_px), and params (method, thresholds)."
+        ),
+    ] = None
+    camera: Annotated[Path | None, Field(description="Camera file whose lens distortion is removed first.")] = None
+
+    @model_validator(mode="after")
+    def _one_source(self) -> GroundSettings:
+        if self.survey is not None and self.reference is not None:
+            raise ValueError("give either survey or reference, not both")
+        return self
+
+
+class Replacement(_Section):
+    """A stage of your own in place of standoff's."""
+
+    factory: Annotated[str, Field(pattern=r"^[\w.]+:\w+$", description="`package.module:callable`.")]
+    options: Annotated[dict[str, Any], Field(description="Keyword arguments for it.")] = {}
+
+
+class Settings(BaseSettings):
+    """Everything that a run depends on, beside its source."""
+
+    model_config = SettingsConfigDict(
+        extra="forbid",
+        frozen=True,
+        env_prefix="STANDOFF_",
+        env_nested_delimiter="__",
+        nested_model_default_partial_update=True,
+    )
+
+    model: Annotated[Path | None, Field(description="The detector, an ONNX file (see `standoff export`).")] = None
+    start_s: Annotated[float, Field(ge=0, description="Begin here; s.")] = 0.0
+    stop_s: Annotated[float | None, Field(gt=0, description="End here; s. Absent: the source's end.")] = None
+    every: Annotated[int, Field(ge=1, description="Read every k-th frame only.")] = 1
+    fps: Annotated[float | None, Field(gt=0, description="Frames a second of an image folder.")] = None
+    detect_every: Annotated[int, Field(ge=1, description="Detect on every k-th frame read; tracks coast between.")] = 1
+    detect: Annotated[DetectParams, Field(description="The detector.")] = DetectParams()
+    ground: Annotated[GroundSettings, Field(description="The ground map.")] = GroundSettings()
+    track: Annotated[TrackParams, Field(description="The tracker.")] = TrackParams()
+    locate: Annotated[LocateParams, Field(description="From boxes to places on the ground.")] = LocateParams()
+    proximity: Annotated[ProximityParams, Field(description="Distances of pairs.")] = ProximityParams()
+    hazard: Annotated[HazardParams, Field(description="From distances to warnings.")] = HazardParams()
+    outputs: Annotated[tuple[OutputName, ...], Field(description="What is written beside run.json.")] = OUTPUT_NAMES
+    tables: Annotated[TableParams, Field(description="The Parquet tables.")] = TableParams()
+    video: Annotated[VideoParams, Field(description="The annotated video.")] = VideoParams()
+    report: Annotated[ReportParams, Field(description="The report.")] = ReportParams()
+    replace: Annotated[dict[StageName, Replacement], Field(description="Stages of your own.")] = {}
+    extra_outputs: Annotated[dict[str, Replacement], Field(description="Sinks of your own, by name.")] = {}
+
+    @model_validator(mode="before")
+    @classmethod
+    def _refuse_unknown_names(cls, values: dict[str, Any]) -> dict[str, Any]:
+        _refuse_unknown_key(values, cls.model_fields, "the top level")
+        for name, info in cls.model_fields.items():
+            _refuse_unknown(info.annotation, values.get(name), name)
+        return values
+
+    @model_validator(mode="after")
+    def _refuse_taken_names(self) -> Settings:
+        taken = sorted(self.extra_outputs.keys() & {*OUTPUT_NAMES, "record"})
+        if taken:
+            raise ValueError(f"extra_outputs: {', '.join(taken)} is the name of an output of standoff's own")
+        return self
+
+
+def _refuse_unknown(annotation: object, value: object, path: str) -> None:
+    """Raise ValueError for a key that no field has, also in the plain dataclasses, which pydantic lets pass."""
+    if is_dataclass(annotation) and isinstance(value, Mapping):
+        hints = get_type_hints(annotation)
+        _refuse_unknown_key(value, hints, path)
+        for key, inner in value.items():
+            _refuse_unknown(hints[key], inner, f"{path}.{key}")
+
+
+def _refuse_unknown_key(given: Mapping[str, object], known: Iterable[str], path: str) -> None:
+    names = list(known)
+    for key in given:
+        if key not in names:
+            near = difflib.get_close_matches(str(key), names, n=1)
+            meant = f"did you mean {near[0]}?" if near else f"there are {', '.join(names)}"
+            raise ValueError(f"{path} has no setting {key!r}; {meant}")
