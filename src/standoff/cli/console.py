@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -17,19 +16,19 @@ if TYPE_CHECKING:
 
 
 def write_json(data: object, path: Path) -> None:
-    """Write JSON to a file, whole or not at all, or to standard output where the path is `-`.
+    """Write JSON to a file, whole or not at all, or to standard output where the path is `-`; NaN becomes null.
 
     Raises:
         OutputError: The file cannot be written.
     """
-    text = json.dumps(data, indent=2, allow_nan=False) + "\n"
+    from standoff.stages.sinks.json_text import json_text
+    from standoff.stages.sinks.json_text import write_json as write_json_file
+
     if str(path) == "-":
-        typer.echo(text, nl=False)
+        typer.echo(json_text(data), nl=False)
         return
-    part = path.with_name(path.name + ".part")
     try:
-        part.write_text(text, encoding="utf-8")
-        part.replace(path)
+        write_json_file(path, data)
     except OSError as error:
         raise OutputError(
             expected=f"to write {path}", found=str(error.strerror), fix="choose a file in a folder that is writable"

@@ -98,14 +98,14 @@ def bench_source(
             "surveyed": monitor_workload(frames=workload_frames),
             "reference": monitor_workload(frames=workload_frames, ground="reference"),
         },
-        baselines=(*_picture_baselines(source, settings), *_detection_baselines(source, settings, darknet)),
+        baselines=(*_picture_baselines(source, settings, frames), *_detection_baselines(source, settings, darknet)),
     )
 
 
-def _picture_baselines(source: Path, settings: Settings) -> Iterator[Baseline]:
+def _picture_baselines(source: Path, settings: Settings, frames: int) -> Iterator[Baseline]:
     if source.is_file():
-        yield decoding_baseline(source)
-    yield from picture_baselines(source, fps=settings.fps)
+        yield decoding_baseline(source, frames)
+    yield from picture_baselines(source, fps=settings.fps, frames=frames)
 
 
 def _detection_baselines(source: Path, settings: Settings, darknet: tuple[Path, Path] | None) -> Iterator[Baseline]:

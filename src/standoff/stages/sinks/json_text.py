@@ -53,11 +53,16 @@ def json_line(value: Any) -> str:  # noqa: ANN401
     return json.dumps(plain(value), allow_nan=False, ensure_ascii=False) + "\n"
 
 
+def json_text(value: Any) -> str:  # noqa: ANN401
+    """Return the value as indented JSON with a line end."""
+    return json.dumps(plain(value), allow_nan=False, ensure_ascii=False, indent=2) + "\n"
+
+
 def write_json(path: Path, value: Any) -> None:  # noqa: ANN401
     """Write an indented JSON file that is, at any moment, either the old one or the new one."""
     partial = partial_path(path)
     with partial.open("w", encoding="utf-8") as file:
-        file.write(json.dumps(plain(value), allow_nan=False, ensure_ascii=False, indent=2) + "\n")
+        file.write(json_text(value))
         file.flush()
         os.fsync(file.fileno())
     partial.replace(path)
