@@ -76,6 +76,8 @@ def open_run(source: Path | str, out: Path | str, settings: Settings, *, overwri
         source, start_s=settings.start_s, stop_s=settings.stop_s, every=settings.every, fps=settings.fps
     )
     pipeline = build_pipeline(settings, frames)
+    if (check_size := getattr(pipeline.ground, "check_size", None)) is not None:
+        check_size(frames.size_px)
     descriptions = {
         "settings": resolved(settings),
         "source": frames.description,

@@ -8,10 +8,10 @@ jump from frame to frame; and the operator may name corner 0 once.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from standoff.core.camera import Camera
 from standoff.core.homography import FloatArray
+from standoff.stages.ground.compiled import compiled
 from standoff.stages.ground.quadrilateral import ORDERS
 from standoff.stages.ground.shape import ReferenceShape
 
@@ -49,7 +49,7 @@ def camera_misfit_px(
     """
     width, height = picture_size_px
     if camera is None:
-        focal = np.geomspace(*focal_widths, _FOCAL_STEPS) * max(width, height)
+        focal = np.exp(np.linspace(*np.log(focal_widths), _FOCAL_STEPS)) * max(width, height)
         centre, focal_xy = np.array([(width - 1) / 2.0, (height - 1) / 2.0]), np.column_stack([focal, focal])
     else:
         centre, focal_xy = camera.matrix[:2, 2], np.array([[camera.matrix[0, 0], camera.matrix[1, 1]]])
@@ -57,8 +57,8 @@ def camera_misfit_px(
     return np.array([_nearest_seen_px(order, shape.corners_m, focal_xy) for order in orders])
 
 
-@njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
-def _nearest_seen_px(corners_px: FloatArray, corners_m: FloatArray, focal_xy: FloatArray) -> float:  # pragma: no cover
+@compiled
+def _nearest_seen_px(corners_px: FloatArray, corners_m: FloatArray, focal_xy: FloatArray) -> float:
     """Return the misfit of one order at the focal length, one of (F, 2), that suits it best; inf if none does."""
     axes = np.zeros((9, 3, 2))
     _add_ground_axes(corners_m, corners_px, axes[0])
@@ -81,8 +81,8 @@ def _nearest_seen_px(corners_px: FloatArray, corners_m: FloatArray, focal_xy: Fl
     return misfit
 
 
-@njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
-def _add_ground_axes(corners_m: FloatArray, corners_px: FloatArray, axes: FloatArray) -> None:  # pragma: no cover
+@compiled
+def _add_ground_axes(corners_m: FloatArray, corners_px: FloatArray, axes: FloatArray) -> None:
     """Add to (3, 2) the first two columns, at some scale, of the homography from (4, 2) metres to (4, 2) pixels.
 
     Three corners as columns, each weighted so that they add up to the fourth: the homography is this matrix of the
@@ -96,8 +96,8 @@ def _add_ground_axes(corners_m: FloatArray, corners_px: FloatArray, axes: FloatA
             axes[row, 1] += pixel * by_y
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
-def _twice_area(corners: FloatArray, j: int, k: int) -> float:  # pragma: no cover
+@compiled
+def _twice_area(corners: FloatArray, j: int, k: int) -> float:
     """Return that of the triangle of corners 3, j and k, with its sign."""
     jx, jy = corners[j, 0] - corners[3, 0], corners[j, 1] - corners[3, 1]
     kx, ky = corners[k, 0] - corners[3, 0], corners[k, 1] - corners[3, 1]
@@ -105,8 +105,8 @@ def _twice_area(corners: FloatArray, j: int, k: int) -> float:  # pragma: no cov
     return area
 
 
-@njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
-def _metric_conditions(axes: FloatArray, focal_x: float, focal_y: float) -> tuple[float, float]:  # pragma: no cover
+@compiled
+def _metric_conditions(axes: FloatArray, focal_x: float, focal_y: float) -> tuple[float, float]:
     """Return two numbers, both 0 where the camera sees the columns of (3, 2) perpendicular and equally long."""
     one_x, one_y, one_z = axes[0, 0] / focal_x, axes[1, 0] / focal_y, axes[2, 0]
     two_x, two_y, two_z = axes[0, 1] / focal_x, axes[1, 1] / focal_y, axes[2, 1]

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
 from standoff.core.camera import Camera
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import ImageArray
+from standoff.stages.ground.compiled import compiled
 
 _FILTER_MARGIN_PX = 5
 """Three pixels of Gaussian, one of Sobel, one of non-maximum suppression."""
@@ -152,10 +152,8 @@ def between_pixels(edges: Edges, gradients: Gradients) -> Edges:
     return Edges(edges.points_px + shift[:, None] * direction, edges.gradient)
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
-def _shifts_to_top(
-    magnitude: npt.NDArray[np.float32], points: FloatArray, direction: FloatArray
-) -> FloatArray:  # pragma: no cover
+@compiled
+def _shifts_to_top(magnitude: npt.NDArray[np.float32], points: FloatArray, direction: FloatArray) -> FloatArray:
     """Return (N,) how far along their (N, 2) directions the parabola through each point and one px around it peaks."""
     shifts = np.zeros(len(points))
     for k in range(len(points)):
@@ -167,8 +165,8 @@ def _shifts_to_top(
     return shifts
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
-def _between(values: npt.NDArray[np.float32], x: float, y: float) -> float:  # pragma: no cover
+@compiled
+def _between(values: npt.NDArray[np.float32], x: float, y: float) -> float:
     """Interpolate linearly; the point lies on the picture."""
     column, row = min(int(x), values.shape[1] - 2), min(int(y), values.shape[0] - 2)
     right, down = x - column, y - row

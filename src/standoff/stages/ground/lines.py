@@ -8,10 +8,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from standoff.core.homography import FloatArray
 from standoff.core.types import IntArray
+from standoff.stages.ground.compiled import compiled
 
 CONTOURS = 4
 
@@ -41,10 +41,8 @@ def sample_pairs(iterations: int, seed: int) -> FloatArray:
     return np.random.default_rng(seed).random((CONTOURS, iterations, 2))
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
-def _most_supported_pair(
-    x: FloatArray, y: FloatArray, pairs: FloatArray, inlier_px: float
-) -> tuple[int, int, int]:  # pragma: no cover
+@compiled
+def _most_supported_pair(x: FloatArray, y: FloatArray, pairs: FloatArray, inlier_px: float) -> tuple[int, int, int]:
     """Return the two points whose line has the most inliers, the first of equals, and how many."""
     count = len(x)
     best_i, best_j, best_votes = -1, -1, -1
@@ -112,8 +110,8 @@ def ransac_contours(points_px: FloatArray, pairs: FloatArray, inlier_px: float) 
     return Contours(lines, label)
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
-def fit_line(points_px: FloatArray, weights: FloatArray) -> FloatArray:  # pragma: no cover
+@compiled
+def fit_line(points_px: FloatArray, weights: FloatArray) -> FloatArray:
     """Fit a line by weighted total least squares.
 
     Args:
@@ -133,16 +131,14 @@ def fit_line(points_px: FloatArray, weights: FloatArray) -> FloatArray:  # pragm
     return np.array([a, b, -(a * centre_x + b * centre_y)])
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
-def facing(line: FloatArray, other: FloatArray) -> FloatArray:  # pragma: no cover
+@compiled
+def facing(line: FloatArray, other: FloatArray) -> FloatArray:
     """Return the line with its normal turned to the side that the other's points to."""
     return line if line[0] * other[0] + line[1] * other[1] >= 0 else -line
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
-def fit_line_robustly(
-    line: FloatArray, points_px: FloatArray, rounds: int, min_scatter_px: float
-) -> FloatArray:  # pragma: no cover
+@compiled
+def fit_line_robustly(line: FloatArray, points_px: FloatArray, rounds: int, min_scatter_px: float) -> FloatArray:
     """Refit a line by iterated total least squares with Tukey's biweight.
 
     Args:

@@ -14,10 +14,10 @@ from itertools import combinations
 
 import cv2
 import numpy as np
-from numba import njit
 
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import IntArray, NoGroundMap
+from standoff.stages.ground.compiled import compiled
 from standoff.stages.ground.edges import Edges, Gradients
 from standoff.stages.ground.lines import fit_line_robustly
 from standoff.stages.ground.quadrilateral import NO_QUADRILATERAL, ORDERS, WALKS, crossings, join_lines, walk_around
@@ -96,10 +96,8 @@ def _covered_before(lines: FloatArray, points: FloatArray, direction: FloatArray
     return count
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
-def _covered_pixels(
-    lines: FloatArray, points: FloatArray, direction: FloatArray, reach: int
-) -> BoolArray:  # pragma: no cover
+@compiled
+def _covered_pixels(lines: FloatArray, points: FloatArray, direction: FloatArray, reach: int) -> BoolArray:
     covered = np.zeros((len(lines), 2 * reach), dtype=np.bool_)
     for row in range(len(lines)):
         mine = agreeing(lines[row], points, direction, _COVER_PX, _COVER_COSINE)
@@ -143,7 +141,7 @@ def _first_believable(
     return chosen
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@compiled
 def _fill_scores(
     lines: FloatArray,
     covered_before: FloatArray,
@@ -151,7 +149,7 @@ def _fill_scores(
     min_side_px: float,
     walks: IntArray,
     corners: FloatArray,
-) -> FloatArray:  # pragma: no cover
+) -> FloatArray:
     """Return (Q,) scores of (Q, 4) walks, 0 where hopeless; fill in the (Q, 4, 2) corners."""
     scores = np.zeros(len(walks))
     for k in range(len(walks)):
@@ -160,10 +158,10 @@ def _fill_scores(
     return scores
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@compiled
 def _score(
     lines: FloatArray, covered_before: FloatArray, min_side_px: float, walk: IntArray, corners: FloatArray
-) -> float:  # pragma: no cover
+) -> float:
     """Return pixels of outline that edges support, less what is bare and what runs on beyond a corner."""
     centre_x = (corners[0, 0] + corners[1, 0] + corners[2, 0] + corners[3, 0]) / 4.0
     centre_y = (corners[0, 1] + corners[1, 1] + corners[2, 1] + corners[3, 1]) / 4.0
@@ -183,8 +181,8 @@ def _score(
     return score if bright_inside == 0 or bright_inside == 4 else score * _MIXED_POLARITY
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
-def _covered(before: FloatArray, low: float, high: float) -> float:  # pragma: no cover
+@compiled
+def _covered(before: FloatArray, low: float, high: float) -> float:
     """Return how many of a line's pixels from `low` to `high` are covered."""
     most = len(before) - 1
     first, last = int(np.rint(low)) + most // 2, int(np.rint(high)) + most // 2
@@ -204,10 +202,10 @@ def _refitted(lines: FloatArray, points: FloatArray, direction: FloatArray) -> F
     return None if joined is None else joined[1]
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@compiled
 def _side_line(
     line: FloatArray, start: FloatArray, end: FloatArray, points: FloatArray, direction: FloatArray
-) -> FloatArray:  # pragma: no cover
+) -> FloatArray:
     """Refit one side to the edge points between its corners."""
     along_x, along_y = end[0] - start[0], end[1] - start[1]
     length = np.hypot(along_x, along_y)

@@ -9,10 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from standoff.core.homography import FloatArray
 from standoff.core.types import IntArray, NoGroundMap
+from standoff.stages.ground.compiled import compiled
 
 NO_QUADRILATERAL = "the contours make no convex quadrilateral"
 OUTSIDE_BOX = "a corner lies outside the reference's box"
@@ -79,8 +79,8 @@ def join_lines(lines: FloatArray) -> tuple[FloatArray, FloatArray] | None:
     return None
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
-def crossings(lines: FloatArray) -> FloatArray:  # pragma: no cover
+@compiled
+def crossings(lines: FloatArray) -> FloatArray:
     """Return (M, M, 2) where each two of (M, 3) lines cross; NaN where they are nearly parallel."""
     count = len(lines)
     meet = np.full((count, count, 2), np.nan)
@@ -93,8 +93,8 @@ def crossings(lines: FloatArray) -> FloatArray:  # pragma: no cover
     return meet
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
-def walk_around(meet: FloatArray, walk: IntArray, corners: FloatArray) -> bool:  # pragma: no cover
+@compiled
+def walk_around(meet: FloatArray, walk: IntArray, corners: FloatArray) -> bool:
     """Find the quadrilateral that one walk along four lines makes, and whether it is convex.
 
     Args:
@@ -148,10 +148,10 @@ def quadrilateral_from_lines(
     return Quadrilateral(corners, covariance, lines, support)
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@compiled
 def _supported(
     line: FloatArray, start: FloatArray, end: FloatArray, points_px: FloatArray, inlier_px: float
-) -> tuple[float, float, float]:  # pragma: no cover
+) -> tuple[float, float, float]:
     """Return the share of a side's length that has edge points, and its line's offset variances at both ends."""
     along_x, along_y = end[0] - start[0], end[1] - start[1]
     length = np.hypot(along_x, along_y)

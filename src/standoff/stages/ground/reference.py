@@ -18,7 +18,7 @@ from standoff.stages.ground.correspondence import camera_misfit_px, turn_from_be
 from standoff.stages.ground.follow import BoxFollower, moved_box
 from standoff.stages.ground.outline import OutlineFinder
 from standoff.stages.ground.params import ReferenceParams
-from standoff.stages.ground.quadrilateral import Quadrilateral
+from standoff.stages.ground.quadrilateral import ORDERS, Quadrilateral
 from standoff.stages.ground.shape import ReferenceShape
 
 NOT_SEEN = "no detection of the reference"
@@ -32,6 +32,9 @@ _LATE_S = 0.5
 
 _TIME_SLACK_S = 1e-3
 _FOLLOWED_MARGIN, _FOLLOWED_MARGIN_PX = 0.06, 4.0
+_UNMOVED = 0.2
+"""An outline found without following the box may have moved by this share of its shortest side."""
+
 _LOOSE = 2.0
 """Corners before their refinement may be twice as far off."""
 
@@ -108,11 +111,11 @@ class ReferenceGround:
         Raises:
             GroundError: The box or the camera does not fit the pictures.
         """
-        finder = self._finder_for(frame)
+        finder = self._finder_for(frame.size_px)
         gray = frame.picture.gray()
         box = self._where(frame.time_s, gray, detections)
         if isinstance(box, NoGroundMap):
-            return box
+            return self._unmoved(finder, gray, frame) or box
         self._box = box
         self._follower.start(gray, box)
         self._outlined = False
@@ -123,19 +126,48 @@ class ReferenceGround:
         if isinstance(turn, NoGroundMap):
             return turn
         ground = self._map(outline, turn, frame.size_px)
-        self._remember(ground, np.roll(outline.corners_px, -turn, axis=0), frame.time_s, gray)
+        self._remember(ground, outline.corners_px[ORDERS[turn]], frame.time_s, gray)
         return ground
 
-    def _finder_for(self, frame: Frame) -> OutlineFinder:
-        if self._finder is None or self._size_px != frame.size_px:
-            width, height = frame.size_px
+    def check_size(self, size_px: tuple[int, int]) -> None:
+        """Make sure that box and camera fit pictures of a size (width, height), before the first frame.
+
+        Raises:
+            GroundError: They do not.
+        """
+        self._finder_for(size_px)
+
+    def _unmoved(self, finder: OutlineFinder, gray: ImageArray, frame: Frame) -> GroundMap | None:
+        """Look where the reference was last: plain ground gives optical flow nothing to hold on to.
+
+        Only an outline that has hardly moved is believed, because nothing else tells that it is the same object.
+        """
+        if self._box is None or self._corners is None or frame.time_s - self._known_s > self._params.memory_s:
+            return None
+        outline = finder.find(gray, self._box)
+        if isinstance(outline, NoGroundMap):
+            return None
+        turn = turn_from_before(outline.corners_px, self._corners)
+        corners_px = outline.corners_px[ORDERS[turn]]
+        sides_px = np.linalg.norm(corners_px[ORDERS[1]] - corners_px, axis=1)
+        moved_px = np.linalg.norm(corners_px - self._corners, axis=1)
+        misfit, limit = self._misfit(outline.corners_px)
+        if moved_px.max() > _UNMOVED * sides_px.min() or misfit[turn] > limit:
+            return None
+        ground = self._map(outline, turn, frame.size_px)
+        self._remember(ground, corners_px, frame.time_s, gray)
+        return ground
+
+    def _finder_for(self, size_px: tuple[int, int]) -> OutlineFinder:
+        if self._finder is None or self._size_px != size_px:
+            width, height = size_px
             if self._given_box is not None:
                 left, top, right, bottom = self._given_box
                 if left >= width or top >= height or right <= 0 or bottom <= 0:
                     raise _box_error(f"a box in the picture of {width}x{height}", f"{self._given_box.tolist()}")
             if self._given_camera is not None:
                 self._camera = _camera_for(self._given_camera, width, height)
-            self._size_px = frame.size_px
+            self._size_px = size_px
             self._finder = OutlineFinder(self._params, self._camera, self._could_be_reference)
         return self._finder
 
@@ -190,7 +222,7 @@ class ReferenceGround:
     def _misfit(self, corners_px: FloatArray) -> tuple[FloatArray, float]:
         """Return the misfit of each cyclic order and the largest that is believed, both in px."""
         assert self._size_px is not None
-        sides_px = np.linalg.norm(np.roll(corners_px, -1, axis=0) - corners_px, axis=1)
+        sides_px = np.linalg.norm(corners_px[ORDERS[1]] - corners_px, axis=1)
         limit = max(self._params.plausible_px, self._params.plausible_share * float(sides_px.mean()))
         misfit = camera_misfit_px(corners_px, self._shape, self._size_px, self._params.focal_widths, self._camera)
         return misfit, limit
@@ -226,9 +258,9 @@ class ReferenceGround:
         return None
 
     def _map(self, outline: Quadrilateral, turn: int, size_px: tuple[int, int]) -> GroundMap:
-        corners_px = np.roll(outline.corners_px, -turn, axis=0)
+        corners_px = outline.corners_px[ORDERS[turn]]
         matrix = homography.fit(corners_px, self._shape.corners_m)
-        covariance_px2 = np.roll(outline.covariance_px2, -turn, axis=0)
+        covariance_px2 = outline.covariance_px2[ORDERS[turn]]
         return GroundMap(
             image_to_ground=matrix,
             covariance=homography.fit_covariance(matrix, corners_px, covariance_px2),
@@ -264,7 +296,7 @@ def rectified_scale_m_per_px(corners_px: FloatArray, shape: ReferenceShape) -> f
     >>> round(rectified_scale_m_per_px(square_px, ReferenceShape.square(2.89)), 6)
     0.0289
     """
-    perimeter_px = float(np.linalg.norm(np.roll(corners_px, -1, axis=0) - corners_px, axis=1).sum())
+    perimeter_px = float(np.linalg.norm(corners_px[ORDERS[1]] - corners_px, axis=1).sum())
     return float(shape.sides_m.sum()) / perimeter_px
 
 

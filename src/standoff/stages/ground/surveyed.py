@@ -86,6 +86,20 @@ class SurveyedGround:
         self._current_size_px = image_size_px
         self.description = _describe(self.fit, self._surveyed, names, point_sigma_px)
 
+    def check_size(self, size_px: tuple[int, int]) -> None:
+        """Make sure that pictures of a size (width, height) have the survey's shape, before the first frame.
+
+        Raises:
+            GroundError: They do not.
+        """
+        if isinstance(_scaled(self._surveyed, size_px), NoGroundMap):
+            width, height = self._surveyed.image_size_px
+            raise GroundError(
+                expected=f"pictures of the survey's shape, {width}x{height}",
+                found=f"{size_px[0]}x{size_px[1]}",
+                fix="survey a frame of this source",
+            )
+
     def update(self, frame: Frame, detections: Detections) -> GroundMap | NoGroundMap:
         """Return the map for a frame; the detections play no part.
 

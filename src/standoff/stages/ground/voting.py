@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import IntArray
+from standoff.stages.ground.compiled import compiled
 from standoff.stages.ground.lines import facing, fit_line
 
 _STEPS = 360
@@ -30,7 +30,7 @@ _FIT_ROUNDS = 3
 _MAX_TURN_COSINE = 0.98
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@compiled
 def _vote(
     table: npt.NDArray[np.float32],
     points: FloatArray,
@@ -38,7 +38,7 @@ def _vote(
     normals: FloatArray,
     voting: BoolArray,
     weight: float,
-) -> None:  # pragma: no cover
+) -> None:
     """Add some points' votes to a (directions, offsets) table, each shared between the two nearest offsets."""
     steps = len(table)
     middle = table.shape[1] // 2
@@ -52,10 +52,8 @@ def _vote(
             table[row, column + 1] += weight * share
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
-def agreeing(
-    line: FloatArray, points: FloatArray, direction: FloatArray, near_px: float, cosine: float
-) -> BoolArray:  # pragma: no cover
+@compiled
+def agreeing(line: FloatArray, points: FloatArray, direction: FloatArray, near_px: float, cosine: float) -> BoolArray:
     """Return which points lie near a line with the gradient along its normal, sign included.
 
     Args:
@@ -72,10 +70,8 @@ def agreeing(
     return mask
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
-def _refined(
-    line: FloatArray, points: FloatArray, direction: FloatArray, free: BoolArray
-) -> FloatArray:  # pragma: no cover
+@compiled
+def _refined(line: FloatArray, points: FloatArray, direction: FloatArray, free: BoolArray) -> FloatArray:
     for _ in range(_FIT_ROUNDS):
         near = agreeing(line, points, direction, _NEAR_PX, _AGREE_COSINE) & free
         count = near.sum()
