@@ -5,7 +5,7 @@ import sys
 
 PROGRAM = """
 from numba.core import caching
-caching._CacheImpl._locator_classes = []
+caching.CacheImpl._locator_classes = []
 from standoff.stages.ground.compiled import compiled
 
 @compiled

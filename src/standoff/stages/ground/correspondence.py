@@ -49,7 +49,8 @@ def camera_misfit_px(
     """
     width, height = picture_size_px
     if camera is None:
-        focal = np.exp(np.linspace(*np.log(focal_widths), _FOCAL_STEPS)) * max(width, height)
+        shortest, longest = focal_widths
+        focal = shortest * (longest / shortest) ** np.linspace(0.0, 1.0, _FOCAL_STEPS) * max(width, height)
         centre, focal_xy = np.array([(width - 1) / 2.0, (height - 1) / 2.0]), np.column_stack([focal, focal])
     else:
         centre, focal_xy = camera.matrix[:2, 2], np.array([[camera.matrix[0, 0], camera.matrix[1, 1]]])
