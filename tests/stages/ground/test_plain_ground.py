@@ -8,7 +8,7 @@ import pytest
 import tolerances
 
 from standoff.core.errors import GroundError
-from standoff.core.types import Detections, Frame
+from standoff.core.types import Detections, Frame, GroundMap
 from standoff.stages.frames import frame_from_array
 from standoff.stages.ground import ReferenceGround, ReferenceShape, SurveyedGround
 
@@ -26,8 +26,8 @@ def picture(index: int, shift_px: float = 0.0, *, visible: bool = True) -> Frame
 def test_a_reference_that_stays_where_it_is_stays_known() -> None:
     ground = ReferenceGround(ReferenceShape.square(2.0), box_xyxy_px=BOX)
     maps = [ground.update(picture(index), Detections.empty()) for index in range(10)]
-    assert all(maps)
-    corners = np.array([found.anchors_px for found in maps if found])
+    assert all(isinstance(found, GroundMap) for found in maps)
+    corners = np.array([found.anchors_px for found in maps if isinstance(found, GroundMap)])
     assert np.ptp(corners, axis=0).max() < tolerances.EDGE_PX
 
 

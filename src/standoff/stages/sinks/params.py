@@ -37,8 +37,10 @@ class VideoParams:
     """The annotated video."""
 
     max_width_px: Annotated[
-        int, Interval(ge=320, le=7680), Doc("Width of the video, panel included; px. Larger sources are scaled down.")
-    ] = 1920
+        int,
+        Interval(ge=320, le=7680),
+        Doc("Width of the video, panel included; px. Larger sources are scaled down: drawing costs by the pixel."),
+    ] = 1600
     panel: Annotated[bool, Doc("Show the rectified picture (Eq. 5) with a scale bar beside the camera's.")] = True
     panel_aspect: Annotated[float, Interval(ge=0.3, le=2.0), Doc("Width of the panel over its height.")] = 0.6
     crf: Annotated[
