@@ -17,7 +17,8 @@ import pytest
 import yaml
 
 from standoff.cli import main
-from standoff.core.types import Detections, Frame
+from standoff.core.errors import GroundError
+from standoff.core.types import Detections, Frame, NoGroundMap
 
 Call = Callable[..., tuple[int, str, str]]
 OUTPUTS = {"run.json", "tracks.parquet", "proximity.parquet", "frames.parquet", "hazards.jsonl", "annotated.mp4"}
@@ -233,14 +234,33 @@ def test_a_truncated_video_keeps_what_was_read_and_says_that_it_is_not_all(
     assert pq.read_table(tmp_path / "out" / "frames.parquet").num_rows == record["counts"]["frames"]
 
 
+class Unplugged:
+    """A ground stage whose sensor is not there."""
+
+    def update(self, frame: Frame, detections: Detections) -> NoGroundMap:
+        raise GroundError(expected="a sensor", found="none", fix="plug it in")
+
+
 def test_a_run_that_fails_on_its_first_frame_is_one_line_and_a_record_of_it(
+    call: Call, video: Path, site: Path, tmp_path: Path
+) -> None:
+    settings = yaml.safe_load(site.read_text())
+    settings["replace"]["ground"] = {"factory": "cli.test_cli:Unplugged"}
+    site.write_text(yaml.safe_dump(settings), encoding="utf-8")
+    code, out, err = call("run", video, "--config", site, "--out", tmp_path / "out")
+    assert (code, out) == (2, "")
+    assert err == "standoff: expected a sensor, found none. Plug it in.\n"
+    assert json.loads((tmp_path / "out" / "run.json").read_text())["status"] == "failed"
+
+
+def test_a_reference_box_outside_the_picture_is_told_before_anything_is_written(
     call: Call, video: Path, site: Path, tmp_path: Path
 ) -> None:
     words = ("--ground", "square:2", "--reference-box", "900,900,950,950")
     code, out, err = call("run", video, "--config", site, "--out", tmp_path / "out", *words)
     assert (code, out) == (2, "")
     assert err.startswith("standoff: expected a box in the picture") and err.count("\n") == 1
-    assert json.loads((tmp_path / "out" / "run.json").read_text())["status"] == "failed"
+    assert not (tmp_path / "out").exists()
 
 
 def test_the_reference_box_is_for_the_first_frame_that_is_read(
