@@ -154,5 +154,5 @@ def test_a_source_is_timed_with_all_its_outputs_and_nothing_is_left_behind(tmp_p
     assert report["machine"]["processor"]
     assert report["source"]["frames_expected"] == 12
     assert report["workload_1080p_10_tracks"].keys() == {"surveyed", "reference"}
-    assert len(report["baselines"]) == (3 if kind == "video" else 2)
+    assert len(report["baselines"]) == (4 if kind == "video" else 3)
     assert sorted(path.name for path in tmp_path.iterdir()) == [source.name]

@@ -10,7 +10,12 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from standoff.config import Settings
-from standoff.evaluation.bench_baselines import decoding_baseline, detection_baseline, picture_baselines
+from standoff.evaluation.bench_baselines import (
+    decoding_baseline,
+    detection_baseline,
+    picture_baselines,
+    ransac_baseline,
+)
 from standoff.evaluation.bench_workload import DrawingSink, monitor_workload
 from standoff.evaluation.timing import Baseline, StageTimes, collect_times, machine
 from standoff.monitor import open_run
@@ -98,7 +103,11 @@ def bench_source(
             "surveyed": monitor_workload(frames=workload_frames),
             "reference": monitor_workload(frames=workload_frames, ground="reference"),
         },
-        baselines=(*_picture_baselines(source, settings, frames), *_detection_baselines(source, settings, darknet)),
+        baselines=(
+            *_picture_baselines(source, settings, frames),
+            ransac_baseline(),
+            *_detection_baselines(source, settings, darknet),
+        ),
     )
 
 
