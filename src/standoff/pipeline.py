@@ -67,7 +67,11 @@ class Pipeline:
             outcome = Outcome("failed", str(error) or type(error).__name__)
             raise
         finally:
-            self._close(outcome, self.hazard.close(time_s))
+            hazards: tuple[Hazard, ...] = ()
+            try:
+                hazards = self.hazard.close(time_s)
+            finally:
+                self._close(outcome, hazards)
 
     def step(self, frame: Frame, stage_ms: dict[str, float], *, detect: bool = True) -> FrameResult:
         """Take one frame through all stages; add each stage's milliseconds to `stage_ms`."""

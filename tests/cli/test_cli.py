@@ -15,12 +15,11 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 import yaml
+from cli.calling import Call
 
-from standoff.cli import main
 from standoff.core.errors import GroundError
 from standoff.core.types import Detections, Frame, NoGroundMap
 
-Call = Callable[..., tuple[int, str, str]]
 OUTPUTS = {"run.json", "tracks.parquet", "proximity.parquet", "frames.parquet", "hazards.jsonl", "annotated.mp4"}
 
 
@@ -34,48 +33,8 @@ class Approach:
 
 
 @pytest.fixture
-def call(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Call:
-    """Run the program in this process; give its exit code, standard output and standard error."""
-
-    def run(*words: object) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["standoff", *map(str, words)])
-        before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-        try:
-            with pytest.raises(SystemExit) as left:
-                main()
-        finally:
-            for number, handler in before.items():
-                signal.signal(number, handler)
-        printed = capsys.readouterr()
-        code = left.value.code
-        return code if isinstance(code, int) else int(code is not None), printed.out, printed.err
-
-    return run
-
-
-@pytest.fixture
 def video(tmp_path: Path) -> Path:
     return make_video(tmp_path / "site.mp4", 34)
-
-
-@pytest.fixture
-def site(tmp_path: Path) -> Path:
-    """Settings with a scripted detector and a survey in which twenty pixels are a metre."""
-    survey = {
-        "image_size_px": [320, 240],
-        "points": [
-            {"name": f"{x},{y}", "px": [x, y], "m": [x / 20, (240 - y) / 20]} for x in (10, 300) for y in (60, 230)
-        ],
-    }
-    (tmp_path / "survey.yaml").write_text(yaml.safe_dump(survey), encoding="utf-8")
-    settings = {
-        "ground": {"survey": "survey.yaml"},
-        "replace": {"detect": {"factory": "cli.test_cli:Approach"}},
-        "locate": {"radius_m": {"worker": 1.0, "excavator": 3.0}},
-    }
-    path = tmp_path / "site.yaml"
-    path.write_text(yaml.safe_dump(settings), encoding="utf-8")
-    return path
 
 
 def make_video(path: Path, frames: int) -> Path:
@@ -335,69 +294,3 @@ def test_an_interrupted_run_leaves_whole_files_that_say_so(
     with av.open(str(film)) as container:
         assert sum(1 for _ in container.decode(video=0)) == record["counts"]["frames"]
     assert "interrupted" in (tmp_path / "out" / "report.html").read_text().lower()
-
-
-def test_the_settings_that_are_shown_can_be_run(call: Call, site: Path, tmp_path: Path) -> None:
-    code, out, _ = call("config", "show", "--config", site)
-    assert code == 0
-    (tmp_path / "shown.yaml").write_text(out)
-    first, second = (
-        json.loads(call("config", "show", "--config", path, "--json")[1]) for path in (site, tmp_path / "shown.yaml")
-    )
-    assert first == second
-
-
-def test_check_reads_the_files_that_the_settings_name(call: Call, site: Path, tmp_path: Path) -> None:
-    assert call("config", "check", site)[0] == 0
-    (tmp_path / "survey.yaml").unlink()
-    code, _, err = call("config", "check", site)
-    assert code == 2
-    assert "survey.yaml" in err
-
-
-@pytest.mark.parametrize(
-    "verb",
-    [
-        (),
-        ("run",),
-        ("export",),
-        ("calibrate",),
-        ("evaluate",),
-        ("evaluate", "positions"),
-        ("config",),
-        ("bench",),
-        ("doctor",),
-    ],
-)
-def test_every_verb_explains_itself(call: Call, verb: tuple[str, ...]) -> None:
-    code, out, _ = call(*verb, "--help")
-    assert code == 0
-    assert "Usage: standoff" in out
-
-
-def test_doctor_names_what_there_is(call: Call) -> None:
-    code, out, _ = call("doctor", "--json")
-    report = json.loads(out)
-    assert code == 0 and report["healthy"]
-    assert {"onnxruntime", "CPUExecutionProvider"} <= {row["name"] for row in report["findings"] if row["ok"]}
-
-
-def test_the_boards_give_the_papers_tables(call: Call, shared_data: Path, tmp_path: Path) -> None:
-    code, out, _ = call(
-        "evaluate", "checkerboard", shared_data / "checkerboards", "--json", tmp_path / "f.json", "--full",
-        "--figure", tmp_path / "f.png",
-    )  # fmt: skip
-    figures = json.loads((tmp_path / "f.json").read_text())
-    assert code == 0
-    assert "Table 5" in out
-    assert 87 <= figures["before_percent"] <= 92 and 97.0 <= figures["after_percent"] <= 97.8
-    assert len(figures["per_view"]) == 13
-    assert (tmp_path / "f.png").stat().st_size > 10_000
-
-
-def test_a_camera_is_calibrated_and_can_be_used(call: Call, shared_data: Path, tmp_path: Path) -> None:
-    camera = tmp_path / "camera.yaml"
-    assert call("calibrate", shared_data / "checkerboards", "--out", camera)[0] == 0
-    code, out, _ = call("evaluate", "checkerboard", shared_data / "checkerboards", "--camera", camera, "--json", "-")
-    assert code == 0
-    assert json.loads(out)["after_percent"] > 97.9
