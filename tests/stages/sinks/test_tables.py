@@ -55,6 +55,7 @@ PROXIMITY_COLUMNS = [
     "time_to_contact_s",
     "filtered",
     "measured",
+    "observed",
 ]
 
 
@@ -194,3 +195,16 @@ def test_a_table_that_lost_a_part_never_gets_the_final_name(
     sink.close(Outcome("complete", sink_errors={"tracks": "No space left on device"}))
     assert not (tmp_path / "tracks.parquet").exists()
     assert set(pq.read_table(tmp_path / "tracks.parts")["frame"].to_pylist()) == {0}
+
+
+def test_a_pair_is_observed_when_both_of_its_tracks_are(tmp_path: Path, results: list[FrameResult]) -> None:
+    sink = TableSink(tmp_path / "proximity.parquet", PROXIMITY)
+    expected: list[bool] = []
+    for result in results:
+        sink.write(result)
+        seen = dict(zip(result.tracks.track_id.tolist(), result.tracks.observed.tolist(), strict=True))
+        pairs = zip(result.proximities.track_a.tolist(), result.proximities.track_b.tolist(), strict=True)
+        expected += [seen[a] and seen[b] for a, b in pairs]
+    sink.close(Outcome("complete"))
+    assert pq.read_table(tmp_path / "proximity.parquet")["observed"].to_pylist() == expected
+    assert set(expected) == {True, False}

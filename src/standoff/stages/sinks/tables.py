@@ -16,6 +16,7 @@ import pyarrow as pa
 
 from standoff import __version__
 from standoff.core.classes import CLASSES
+from standoff.core.homography import BoolArray
 from standoff.core.types import FrameResult, GroundMap, IntArray, NoGroundMap, Outcome, TextArray
 from standoff.stages.sinks.params import TableParams
 from standoff.stages.sinks.parquet_parts import Columns, ParquetParts
@@ -63,6 +64,7 @@ _PROXIMITY_COLUMNS = (
     ("time_to_contact_s", pa.float64(), "s", "until the gap is 0; infinity: never at this speed; null while unknown"),
     ("filtered", pa.bool_(), "", "true: the outlier filter replaced the distance"),
     ("measured", pa.bool_(), "", "false: the distance is unknown, which is not the same as far away"),
+    ("observed", pa.bool_(), "", "false: at least one of the two is predicted, no detection supports it in this frame"),
 )
 _FRAMES_COLUMNS = (
     *_FRAME_COLUMNS,
@@ -163,7 +165,13 @@ def _proximity_rows(result: FrameResult) -> Columns:
         "class_a": _classes_of(pairs.track_a, result),
         "class_b": _classes_of(pairs.track_b, result),
         "measured": np.isfinite(pairs.distance_m),
+        "observed": _seen(pairs.track_a, result) & _seen(pairs.track_b, result),
     }
+
+
+def _seen(track_id: IntArray, result: FrameResult) -> BoolArray:
+    """Return (K,) whether each track is observed in this frame, not only predicted."""
+    return np.isin(track_id, result.tracks.track_id[result.tracks.observed])
 
 
 def _map_values(ground: GroundMap | NoGroundMap) -> dict[str, Any]:
