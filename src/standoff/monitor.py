@@ -8,7 +8,6 @@ for result in open_run("site.mp4", "out", load_settings(Path("site.yaml"))):
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Generator
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,7 +33,6 @@ from standoff.stages.sinks import (
 )
 
 RECORD = "run.json"
-_LOG = logging.getLogger(__name__)
 
 
 @dataclass

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from standoff.core.errors import ConfigError
+from standoff.cli.numbers import two_integers
 
 
 def pattern_size(text: str) -> tuple[int, int]:
@@ -19,12 +19,7 @@ def pattern_size(text: str) -> tuple[int, int]:
     >>> pattern_size("9x6")
     (9, 6)
     """
-    columns, sign, rows = text.lower().partition("x")
-    if not (sign and columns.isdecimal() and rows.isdecimal()):
-        raise ConfigError(
-            expected="a pattern of inner corners, COLUMNSxROWS", found=repr(text), fix="write for example 9x6"
-        )
-    return int(columns), int(rows)
+    return two_integers(text, "x", expected="a pattern of inner corners, COLUMNSxROWS", example="9x6")
 
 
 def calibrate(

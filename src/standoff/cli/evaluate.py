@@ -8,6 +8,8 @@ from typing import Annotated
 import typer
 
 from standoff.cli.calibrate import pattern_size
+from standoff.cli.numbers import two_integers
+from standoff.core.errors import ConfigError
 
 app = typer.Typer(help="Measure accuracy on data with known truth.", no_args_is_help=True)
 _Json = Annotated[Path | None, typer.Option("--json", help="Also write the result as JSON; - prints only that.")]
@@ -120,11 +122,10 @@ def _figure(value: float | None) -> str:
 
 
 def _frame_range(text: str | None) -> tuple[int, int] | None:
-    from standoff.core.errors import ConfigError
-
     if text is None:
         return None
-    first, sign, last = text.partition("-")
-    if not (sign and first.isdecimal() and last.isdecimal() and 0 < int(first) <= int(last)):
-        raise ConfigError(expected="--frames FIRST-LAST", found=repr(text), fix="write for example --frames 1-219")
-    return int(first), int(last)
+    expected, example = "--frames FIRST-LAST", "--frames 1-219"
+    first, last = two_integers(text, "-", expected=expected, example=example)
+    if not 0 < first <= last:
+        raise ConfigError(expected=expected, found=repr(text), fix=f"write for example {example}")
+    return first, last

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from standoff.core.errors import ConfigError
+from standoff.cli.numbers import two_integers
 
 
 def export(
@@ -25,9 +25,4 @@ def export(
 
 
 def _size(text: str | None) -> tuple[int, int] | None:
-    if text is None:
-        return None
-    width, sign, height = text.lower().partition("x")
-    if not (sign and width.isdecimal() and height.isdecimal()):
-        raise ConfigError(expected="--size WxH", found=repr(text), fix="write for example --size 768x576")
-    return int(width), int(height)
+    return None if text is None else two_integers(text, "x", expected="--size WxH", example="--size 768x576")

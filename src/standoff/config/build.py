@@ -10,7 +10,7 @@ from standoff.config.settings import Replacement, Settings, StageName
 from standoff.core.camera import Camera
 from standoff.core.errors import ConfigError
 from standoff.core.protocols import Detector, Ground
-from standoff.core.types import Frame, Sink
+from standoff.core.types import Frame
 from standoff.pipeline import Pipeline
 from standoff.stages.detect import OnnxDetector
 from standoff.stages.ground import ReferenceGround, Unmapped, load_camera, load_survey
@@ -137,13 +137,12 @@ def _check_visible(settings: Settings, detector: Detector) -> None:
         )
 
 
-def build_pipeline(settings: Settings, frames: Iterable[Frame], sinks: Mapping[str, Sink] | None = None) -> Pipeline:
-    """Make one stream's pipeline; all state belongs to the objects made here.
+def build_pipeline(settings: Settings, frames: Iterable[Frame]) -> Pipeline:
+    """Make one stream's pipeline, without sinks; all state belongs to the objects made here.
 
     Args:
         settings: What to build.
         frames: The source.
-        sinks: Outputs by name, in the order in which they get each frame.
 
     Raises:
         StandoffError: A model, survey, camera or replacement that cannot be used.
@@ -158,6 +157,5 @@ def build_pipeline(settings: Settings, frames: Iterable[Frame], sinks: Mapping[s
         locator=build_stage("locate", settings),
         proximity=build_stage("proximity", settings),
         hazard=build_stage("hazard", settings),
-        sinks=dict(sinks or {}),
         detect_every=settings.detect_every,
     )

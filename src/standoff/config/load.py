@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-from pydantic import TypeAdapter, ValidationError
+from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 from pydantic_settings import BaseSettings, InitSettingsSource, PydanticBaseSettingsSource
 
@@ -99,6 +99,4 @@ def load_settings(path: Path | str | None = None, overrides: Mapping[str, Any] |
 
 def resolved(settings: Settings) -> dict[str, Any]:
     """Return the settings as plain JSON values, every default filled in."""
-    plain = TypeAdapter(Settings).dump_python(settings, mode="json")
-    assert isinstance(plain, dict)
-    return plain
+    return settings.model_dump(mode="json")

@@ -125,9 +125,7 @@ class ReferenceGround:
         turn = self._turn(outline.corners_px, frame.time_s)
         if isinstance(turn, NoGroundMap):
             return turn
-        ground = self._map(outline, turn, frame.size_px)
-        self._remember(ground, outline.corners_px[ORDERS[turn]], frame.time_s, gray)
-        return ground
+        return self._accept(outline, turn, frame, gray)
 
     def check_size(self, size_px: tuple[int, int]) -> None:
         """Make sure that box and camera fit pictures of a size (width, height), before the first frame.
@@ -154,9 +152,7 @@ class ReferenceGround:
         misfit, limit = self._misfit(outline.corners_px)
         if moved_px.max() > _UNMOVED * sides_px.min() or misfit[turn] > limit:
             return None
-        ground = self._map(outline, turn, frame.size_px)
-        self._remember(ground, corners_px, frame.time_s, gray)
-        return ground
+        return self._accept(outline, turn, frame, gray)
 
     def _finder_for(self, size_px: tuple[int, int]) -> OutlineFinder:
         if self._finder is None or self._size_px != size_px:
@@ -270,6 +266,12 @@ class ReferenceGround:
             anchors_px=corners_px if self._camera is None else self._camera.distort(corners_px),
             camera=self._camera,
         )
+
+    def _accept(self, outline: Quadrilateral, turn: int, frame: Frame, gray: ImageArray) -> GroundMap:
+        """Make the frame's map of an outline that is believed, and remember it for the frames to come."""
+        ground = self._map(outline, turn, frame.size_px)
+        self._remember(ground, outline.corners_px[ORDERS[turn]], frame.time_s, gray)
+        return ground
 
     def _remember(self, ground: GroundMap, corners_px: FloatArray, time_s: float, gray: ImageArray) -> None:
         self._corners, self._known_s, self._hint, self._outlined = corners_px, time_s, None, True
