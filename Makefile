@@ -28,7 +28,7 @@ $(READY): pyproject.toml requirements.lock requirements-oracles.txt
 	  { echo "standoff needs Python 3.11 or newer; found $$($(PYTHON) --version). Set PYTHON=/path/to/python3.11."; exit 2; }
 	@test -x $(BIN)/python && $(BIN)/python -m pip --version >/dev/null 2>&1 || $(PYTHON) -m venv --clear $(VENV) || $(MAKE) --no-print-directory venv-by-apt
 	$(BIN)/python -m pip install --quiet --upgrade pip
-	$(BIN)/python -m pip install --quiet --constraint requirements.lock --editable '.[dev,train]'
+	$(BIN)/python -m pip install --quiet --constraint requirements.lock --editable '.[dev,train,sim]'
 	$(BIN)/python -m pip install --quiet --no-deps --requirement requirements-oracles.txt
 	@touch $@
 

@@ -1,0 +1,115 @@
+"""Where a camera is and where it looks: site coordinates to pixels and back.
+
+Site frame: x east, y north, z up, metres. Camera frame: x to the right of the picture, y down, z forward.
+Pixels follow the half-pixel convention of `standoff.core.camera`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from standoff.core.camera import Camera
+from standoff.core.homography import FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class View:
+    """A camera at a place, looking somewhere.
+
+    Attributes:
+        camera: Lens and picture size.
+        position_m: (3,) of the optical centre, site frame.
+        site_to_camera: (3, 3) rotation; its rows are the camera's axes in the site frame.
+    """
+
+    camera: Camera
+    position_m: FloatArray
+    site_to_camera: FloatArray
+
+    def __post_init__(self) -> None:
+        position = np.array(self.position_m, dtype=np.float64)
+        rotation = np.array(self.site_to_camera, dtype=np.float64)
+        if position.shape != (3,) or rotation.shape != (3, 3):
+            raise ValueError(f"position must be (3,), rotation (3, 3), not {position.shape} and {rotation.shape}")
+        if not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-9) or np.linalg.det(rotation) < 0:
+            raise ValueError("site_to_camera must be a rotation")
+        position.setflags(write=False)
+        rotation.setflags(write=False)
+        object.__setattr__(self, "position_m", position)
+        object.__setattr__(self, "site_to_camera", rotation)
+
+    @classmethod
+    def aimed(
+        cls, camera: Camera, position_m: FloatArray, *, heading_deg: float, pitch_deg: float, roll_deg: float = 0.0
+    ) -> Self:
+        """Point the camera as a gimbal does.
+
+        Args:
+            camera: Lens and picture size.
+            position_m: (3,) site frame.
+            heading_deg: Where the picture's upper edge points on the ground, clockwise from north.
+            pitch_deg: Downwards from the horizon: 0 looks at it, 90 straight down.
+            roll_deg: Right side of the picture down is positive.
+        """
+        heading, pitch, roll = np.deg2rad([heading_deg, pitch_deg, roll_deg])
+        right = np.array([np.cos(heading), -np.sin(heading), 0.0])
+        ahead = np.array([np.sin(heading), np.cos(heading), 0.0])
+        forward = np.cos(pitch) * ahead - np.sin(pitch) * np.array([0.0, 0.0, 1.0])
+        down = np.cross(forward, right)
+        rolled_right = np.cos(roll) * right + np.sin(roll) * down
+        return cls(camera, position_m, np.stack([rolled_right, np.cross(forward, rolled_right), forward]))
+
+    def project(self, points_m: FloatArray) -> FloatArray:
+        """Show where points of the site appear, lens distortion included.
+
+        Args:
+            points_m: (N, 3), site frame.
+
+        Returns:
+            (N, 2) pixels, in or outside the picture; NaN behind the camera or outside the lens model.
+        """
+        return self.camera.distort(self.project_pinhole(points_m))
+
+    def project_pinhole(self, points_m: FloatArray) -> FloatArray:
+        """Show where points of the site would appear without lens distortion; NaN behind the camera."""
+        offset = np.asarray(points_m, dtype=np.float64).reshape(-1, 3) - self.position_m
+        homogeneous = offset @ (self.camera.matrix @ self.site_to_camera).T
+        depth_m = homogeneous[:, 2:]
+        pinhole_px: FloatArray = homogeneous[:, :2] / np.where(depth_m > 0, depth_m, np.nan)
+        return pinhole_px
+
+    def rays(self, points_px: FloatArray) -> FloatArray:
+        """Return (N, 3) unit vectors in the site frame from the camera through picture points (N, 2); NaN if none."""
+        pinhole_px = self.camera.undistort(np.asarray(points_px, dtype=np.float64).reshape(-1, 2))
+        homogeneous = np.column_stack([pinhole_px, np.ones(len(pinhole_px))])
+        direction = homogeneous @ (self.site_to_camera.T @ np.linalg.inv(self.camera.matrix)).T
+        unit: FloatArray = direction / np.linalg.norm(direction, axis=1, keepdims=True)
+        return unit
+
+    def to_plane(self, points_px: FloatArray, height_m: float = 0.0) -> FloatArray:
+        """Intersect the rays of picture points with the horizontal plane z = height_m.
+
+        Args:
+            points_px: (N, 2), as seen in the picture.
+            height_m: Of the plane.
+
+        Returns:
+            (N, 2) x east, y north; NaN where the ray does not meet the plane in front of the camera.
+        """
+        ray = self.rays(points_px)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            reach_m = (height_m - self.position_m[2]) / ray[:, 2]
+        reach_m = np.where(np.isfinite(reach_m) & (reach_m > 0), reach_m, np.nan)
+        xy_m: FloatArray = self.position_m[:2] + ray[:, :2] * reach_m[:, None]
+        return xy_m
+
+    def plane_to_pinhole(self, height_m: float = 0.0) -> FloatArray:
+        """Return the signed (3, 3) homography from the plane z = height_m to undistorted pixels."""
+        camera_from_plane = np.column_stack(
+            [self.site_to_camera[:, :2], self.site_to_camera @ (np.array([0.0, 0.0, height_m]) - self.position_m)]
+        )
+        homography: FloatArray = self.camera.matrix @ camera_from_plane
+        return homography

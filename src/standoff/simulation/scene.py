@@ -1,0 +1,226 @@
+"""What a scene is made of: batches of meshes, light, ground, actors, the reference object, the camera's flight.
+
+Everything is a function of the scene's time: any frame can be rendered alone, and twice gives the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from standoff.core.homography import FloatArray
+from standoff.core.pose import View
+from standoff.simulation.mesh import Colour, Float32Array, Mesh
+
+NOTHING = 0
+"""The entity id of everything that the truth does not name."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Batch:
+    """One mesh in many places.
+
+    Attributes:
+        mesh: What is placed.
+        poses: (N, 4, 4) local to site (or to the model's frame, in `Model.parts`).
+        tint: (N, 3) linear, multiplies the albedo of tintable vertices.
+        dust: (N,) 0 clean .. 1 caked with the ground's own dust, thicker towards the ground.
+        entity_id: Of the truth, or NOTHING.
+    """
+
+    mesh: Mesh
+    poses: Float32Array
+    tint: Float32Array
+    dust: Float32Array
+    entity_id: int = NOTHING
+
+
+def place(
+    mesh: Mesh, poses: FloatArray, *, tint: Colour | FloatArray = (1.0, 1.0, 1.0), dust: float | FloatArray = 0.2,
+    entity_id: int = NOTHING,
+) -> Batch:  # fmt: skip
+    """Build a batch from one (4, 4) or many (N, 4, 4) poses and one or many tints (3,) / (N, 3) and dusts."""
+    many = np.asarray(poses, dtype=np.float32).reshape(-1, 4, 4)
+    count = len(many)
+    return Batch(
+        mesh,
+        many,
+        np.ascontiguousarray(np.broadcast_to(np.asarray(tint, dtype=np.float32), (count, 3))),
+        np.ascontiguousarray(np.broadcast_to(np.asarray(dust, dtype=np.float32), (count,))),
+        entity_id,
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Light:
+    """Sun, sky and haze. Radiances are linear and relative: a white card in full sun and sky shows about 1.
+
+    Attributes:
+        to_sun: (3,) unit vector from the site towards the sun.
+        sun: Colour times strength of direct sunlight; zeros under a closed overcast.
+        sky: Of skylight from above.
+        bounce: Of light from below, reflected by the ground.
+        sun_softness_m_per_m: Width of the penumbra per metre between caster and receiver (clear sky: 0.01).
+        haze_per_m: Extinction; 0 is clear, 0.004 hides a hill at 1 km.
+        haze: Colour that haze adds.
+    """
+
+    to_sun: FloatArray
+    sun: Colour
+    sky: Colour
+    bounce: Colour
+    sun_softness_m_per_m: float
+    haze_per_m: float
+    haze: Colour
+
+
+class Ground(Protocol):
+    """The relief and its look; `standoff.simulation.terrain.Terrain`.
+
+    Attributes:
+        origin_xy_m: (2,) site coordinates of height sample [0, 0] (the south-west corner).
+        cell_m: Distance of height samples.
+        height_m: (ny, nx); row index grows with y (north), column with x (east). Each cell is two triangles, split
+            from its south-west to its north-east corner: that is the surface, in the picture and in the truth.
+        albedo: (h, w, 3) uint8 sRGB picture of the whole extent, row 0 at the southern edge.
+        wetness: (h, w) uint8, 0 dry .. 255 standing water.
+    """
+
+    origin_xy_m: FloatArray
+    cell_m: float
+    height_m: Float32Array
+    albedo: npt.NDArray[np.uint8]
+    wetness: npt.NDArray[np.uint8]
+
+    def height_at(self, xy_m: FloatArray) -> FloatArray:
+        """Return (N,) heights of the rendered surface under (N, 2); the border's height outside."""
+        ...
+
+
+class Model(Protocol):
+    """How an entity looks for given joint values.
+
+    Attributes:
+        class_id: Of `standoff.core.classes`.
+        footprint_m: (K, 2) outline on the ground, local frame, counter-clockwise: the undercarriage of a machine.
+        height_m: Highest point in rest position.
+        joints: Allowed range of each joint.
+    """
+
+    class_id: int
+    footprint_m: FloatArray
+    height_m: float
+    joints: Mapping[str, tuple[float, float]]
+
+    def parts(self, joints: Mapping[str, float]) -> tuple[Batch, ...]:
+        """Return all rigid parts, poses in the model's local frame, entity_id NOTHING."""
+        ...
+
+    def tool_tip_m(self, joints: Mapping[str, float]) -> FloatArray | None:
+        """Return (3,) middle of the bucket's or blade's cutting edge, local frame; None without one."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion:
+    """Where an entity is and how its joints stand, sampled densely; linear in between, held before and after.
+
+    Attributes:
+        time_s: (T,) rising.
+        xy_m: (T, 2) site frame.
+        heading_rad: (T,) direction of local x, counter-clockwise from east, unwrapped.
+        joints: (T,) of each joint by name.
+    """
+
+    time_s: FloatArray
+    xy_m: FloatArray
+    heading_rad: FloatArray
+    joints: Mapping[str, FloatArray] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Actor:
+    """A named entity of the truth: a model with a motion.
+
+    Attributes:
+        entity_id: From 1.
+        model: Its look.
+        motion: Its doings.
+    """
+
+    entity_id: int
+    model: Model
+    motion: Motion
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cover:
+    """Something that lies on the reference object for part of the time.
+
+    Attributes:
+        batch: What it is.
+        start_s: When it appears, rising from the ground within `rise_s`.
+        stop_s: When it is gone.
+        rise_s: Seconds of growing and of shrinking.
+    """
+
+    batch: Batch
+    start_s: float = -np.inf
+    stop_s: float = np.inf
+    rise_s: float = 0.7
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reference:
+    """The reference object of known shape.
+
+    Attributes:
+        top_m: (4, 3) upper corners, site frame, counter-clockwise from above.
+        base_m: (4, 3) the same corners where the sides meet the ground; equal to `top_m` for a flat one.
+        batches: Its look, entity id set.
+        covers: Sand, plates, ... on it.
+        entity_id: Of the truth.
+    """
+
+    top_m: FloatArray
+    base_m: FloatArray
+    batches: tuple[Batch, ...]
+    covers: tuple[Cover, ...]
+    entity_id: int
+
+
+class Flight(Protocol):
+    """The camera's way through the air."""
+
+    def view(self, time_s: float) -> View:
+        """Return where the camera is and looks at a moment, all shake included."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene:
+    """All of it.
+
+    Attributes:
+        name: Preset.
+        seed: Of everything random in it.
+        ground: Relief and soils.
+        props: Everything that stands still and is not named in the truth.
+        actors: Workers and machines.
+        reference: Or None.
+        light: Sun and sky.
+        flight: Camera.
+    """
+
+    name: str
+    seed: int
+    ground: Ground
+    props: tuple[Batch, ...]
+    actors: tuple[Actor, ...]
+    reference: Reference | None
+    light: Light
+    flight: Flight
