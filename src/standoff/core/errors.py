@@ -8,6 +8,7 @@
     ├── GroundError            points, quadrilateral or camera file do not define a ground map
     ├── ConfigError            the configuration is wrong
     ├── OutputError            the output folder cannot be used
+    ├── SimulationError        a simulated clip cannot be rendered
     ├── DataError              an evaluation's truth or run folder cannot be used
     └── MissingDependency      an optional package or system library is not installed
 
@@ -15,6 +16,8 @@ A failed *estimate* is never an exception: see `standoff.core.types.NoGroundMap`
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 
 class StandoffError(Exception):
@@ -32,6 +35,14 @@ class StandoffError(Exception):
         self.fix = fix
         line = f"expected {expected}, found {found}. {fix[:1].upper()}{fix[1:]}."
         super().__init__(" ".join(line.split()))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _again, (type(self), self.expected, self.found, self.fix)
+
+
+def _again(kind: type[StandoffError], expected: str, found: str, fix: str) -> StandoffError:
+    """Rebuild an error that came from another process."""
+    return kind(expected=expected, found=found, fix=fix)
 
 
 class SourceError(StandoffError):
@@ -64,6 +75,10 @@ class OutputError(StandoffError):
 
 class DataError(StandoffError):
     """An evaluation's truth, pictures or run folder cannot be used."""
+
+
+class SimulationError(StandoffError):
+    """A simulated clip cannot be rendered."""
 
 
 class MissingDependency(StandoffError):

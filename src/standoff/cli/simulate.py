@@ -1,0 +1,123 @@
+"""`standoff simulate ...`: a construction site with exact truth, as a clip or as pictures for training."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import contextmanager
+from collections.abc import Generator
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from standoff.cli.numbers import two_integers
+from standoff.simulation.presets import MAX_SEED, PRESETS
+
+app = typer.Typer(
+    help="Render a construction site whose every position, box and pixel is known.", invoke_without_command=True
+)
+_Out = Annotated[Path, typer.Option("--out", "-o", help="Folder for the files; appears when all is done.", show_default=False)]
+_Seed = Annotated[int, typer.Option(help=f"Of everything random, 0 to {MAX_SEED}; the same seed gives the same truth.")]
+_Processes = Annotated[int, typer.Option(min=1, help="That render side by side; the result does not depend on it.")]
+_Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace the folder if it exists.")]
+_Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress bar.")]
+
+
+@app.callback()
+def _presets(
+    context: typer.Context,
+    wanted: Annotated[bool, typer.Option("--list", help="Print the presets and what each shows.")] = False,
+) -> None:
+    from standoff.cli.console import print_table
+
+    if wanted:
+        rows = [
+            (name, f"{preset.width_px}x{preset.height_px}", str(preset.frames), preset.summary)
+            for name, preset in PRESETS.items()
+        ]
+        print_table("standoff simulate PRESET --out DIR", ("preset", "size", "frames", "what it shows"), rows)
+    elif context.invoked_subcommand is None:
+        typer.echo(context.get_help())
+
+
+def _clip_command(name: str) -> Callable[..., None]:
+    def render(
+        out: _Out,
+        seed: _Seed = 0,
+        size: Annotated[str | None, typer.Option(help="Of the picture, WIDTHxHEIGHT px.")] = None,
+        frames: Annotated[int | None, typer.Option(help="How many.")] = None,
+        fps: Annotated[float | None, typer.Option(help="Frames a second.")] = None,
+        altitude: Annotated[float | None, typer.Option(help="Of the camera; m.")] = None,
+        pitch: Annotated[float | None, typer.Option(help="Of the gimbal below the horizon; degrees.")] = None,
+        variable_rate: Annotated[bool, typer.Option("--variable-rate", help="Vary the time between frames.")] = False,
+        masks: Annotated[bool, typer.Option("--masks", help="Masks in annotations.json as well.")] = False,
+        excavator_mesh: Annotated[
+            Path | None, typer.Option(help="Folder of COLLADA or glTF parts in place of the procedural excavator.")
+        ] = None,
+        processes: _Processes = 2,
+        overwrite: _Overwrite = False,
+        quiet: _Quiet = False,
+    ) -> None:
+        from standoff.simulation.presets import plan_clip
+        from standoff.simulation.record import record_clip
+
+        width_px, height_px = parse_size(size)
+        plan = plan_clip(
+            name, seed=seed, masks=masks, variable_rate=variable_rate, excavator_mesh=excavator_mesh, frames=frames,
+            fps=fps, altitude_m=altitude, pitch_deg=pitch, width_px=width_px, height_px=height_px,
+        )  # fmt: skip
+        with _progress(f"rendering {name}", plan.preset.frames, quiet=quiet) as step:
+            record_clip(plan, out, overwrite=overwrite, processes=processes, on_frame=step)
+        typer.echo(f"{out}/video.mp4 and its truth; measure with: standoff evaluate paper {out}")
+
+    render.__doc__ = PRESETS[name].summary
+    return render
+
+
+for _name in PRESETS:
+    app.command(_name)(_clip_command(_name))
+
+
+@app.command()
+def dataset(
+    out: _Out,
+    images: Annotated[int, typer.Option(min=1, help="How many in all.", show_default=False)],
+    per_scene: Annotated[int, typer.Option(min=1, help="Pictures of each scene, from different places and times.")] = 10,
+    size: Annotated[str, typer.Option(help="Of the pictures, WIDTHxHEIGHT px.")] = "1280x720",
+    layout: Annotated[Literal["yolo", "coco"], typer.Option(help="Of the annotations.")] = "yolo",
+    held_out: Annotated[float, typer.Option(min=0, max=0.5, help="Share of scenes for each of val and test.")] = 0.1,
+    seed: _Seed = 0,
+    excavator_mesh: Annotated[
+        Path | None, typer.Option(help="Folder of COLLADA or glTF parts for a third of the excavators.")
+    ] = None,
+    processes: _Processes = 2,
+    overwrite: _Overwrite = False,
+    quiet: _Quiet = False,
+) -> None:
+    """Render independent scenes for training, split by scene."""
+    from standoff.simulation.dataset import DatasetPlan, record_dataset
+
+    width_px, height_px = parse_size(size)
+    plan = DatasetPlan(
+        images=images, per_scene=per_scene, width_px=width_px or 0, height_px=height_px or 0, layout=layout,
+        held_out=held_out, seed=seed, excavator_mesh=excavator_mesh,
+    )  # fmt: skip
+    with _progress("rendering pictures", images, quiet=quiet) as step:
+        record_dataset(plan, out, overwrite=overwrite, processes=processes, on_picture=step)
+    typer.echo(f"{images} pictures in {out}")
+
+
+def parse_size(size: str | None) -> tuple[int | None, int | None]:
+    """Read `--size WIDTHxHEIGHT`; None stays (None, None)."""
+    if size is None:
+        return None, None
+    return two_integers(size, "x", expected="a size as WIDTHxHEIGHT", example="1920x1080")
+
+
+@contextmanager
+def _progress(what: str, total: int, *, quiet: bool) -> Generator[Callable[[], None], None, None]:
+    from standoff.cli.console import progress_bar
+
+    with progress_bar(quiet=quiet) as bar:
+        task = bar.add_task(what, total=total)
+        yield lambda: bar.advance(task)

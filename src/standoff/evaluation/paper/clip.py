@@ -1,0 +1,249 @@
+"""Read a clip with exact truth: the folder that `standoff simulate` writes."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from standoff.core.classes import CLASSES, Role
+from standoff.core.errors import DataError
+from standoff.core.homography import BoolArray, FloatArray
+from standoff.core.types import IntArray
+from standoff.evaluation.paper.clip_tables import FRAMES, PAIRS, REFERENCE_PX, TRUTH, read_table
+from standoff.evaluation.positions_input import Columns
+
+FORMAT = 1
+SCENE = "scene.json"
+_FIX = "render the clip again with `standoff simulate`"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrueReference:
+    """The reference object as it really is.
+
+    Attributes:
+        entity_id: In the truth.
+        corners_m: (4, 2) of its top, site frame.
+        corners_px: (F, 4, 2) the same corners in each picture; NaN where no lens sees them.
+        visible_share: (F,) of its pixels that can be seen.
+        covered: (F,) whether something lies on it.
+    """
+
+    entity_id: int
+    corners_m: FloatArray
+    corners_px: FloatArray
+    visible_share: FloatArray
+    covered: BoolArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrueBoard:
+    """A checkerboard as it really is.
+
+    Attributes:
+        side: Inner corners along a side.
+        square_m: Side of a square.
+        corners_px: (F, side, side, 2) in each picture.
+    """
+
+    side: int
+    square_m: float
+    corners_px: FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Clip:
+    """A clip with its truth, as arrays by frame (F), entity (E, the reference left out) and pair (P).
+
+    Attributes:
+        folder: Where it is.
+        preset: What it was rendered from.
+        seed: Of the rendering.
+        frame_count: F.
+        entity_id: (E,) rising.
+        class_id: (E,) ids of `CLASSES`.
+        box_px: (F, E, 4) visible part; NaN where nothing can be seen.
+        xy_m: (F, E, 2) centre of the footprint, site frame.
+        reference_box_px: (F, 4) visible part of the reference; NaN where nothing can be seen, or without one.
+        pairs: (P, 2) rows of E: each person with each machine, the person first.
+        distance_m: (F, P) true distance, centre to centre.
+        reference: None without one.
+        board: None without one.
+    """
+
+    folder: Path
+    preset: str
+    seed: int
+    frame_count: int
+    entity_id: IntArray
+    class_id: IntArray
+    box_px: FloatArray
+    xy_m: FloatArray
+    reference_box_px: FloatArray
+    pairs: IntArray
+    distance_m: FloatArray
+    reference: TrueReference | None
+    board: TrueBoard | None
+
+    @property
+    def name(self) -> str:
+        """The folder's name."""
+        return self.folder.resolve().name
+
+    @property
+    def video(self) -> Path:
+        """The video's file."""
+        return self.folder / "video.mp4"
+
+    def names(self) -> list[str]:
+        """Return (E,) the classes, numbered where there are several of one."""
+        of_class = [CLASSES[class_id].name for class_id in self.class_id]
+        return [
+            name if of_class.count(name) == 1 else f"{name} {1 + of_class[:row].count(name)}"
+            for row, name in enumerate(of_class)
+        ]
+
+
+def load_clip(folder: Path | str) -> Clip:
+    """Read a clip folder.
+
+    Args:
+        folder: Holds `video.mp4`, `scene.json`, `camera.yaml`, `reference.yaml` and the three tables of truth.
+
+    Raises:
+        DataError: A file is missing or not what it should be, or the clip shows nothing that the paper's tests need.
+    """
+    folder = Path(folder)
+    scene = _read_scene(folder)
+    for name in ("video.mp4", "camera.yaml", "reference.yaml"):
+        if not (folder / name).is_file():
+            raise DataError(expected=f"{name} in the clip", found=f"no {folder / name}", fix=_FIX)
+    truth, pairs, frames = (
+        read_table(folder / f"{name}.parquet", columns)
+        for name, columns in (("truth", TRUTH), ("pairs", PAIRS), ("frames", FRAMES))
+    )
+    count = len(frames["frame"])
+    if count == 0 or (frames["frame"] != np.arange(count)).any():
+        raise DataError(expected="frames from 0 on in frames.parquet", found=f"others in {folder}", fix=_FIX)
+    for name, table in (("truth", truth), ("pairs", pairs)):
+        if len(table["frame"]) and not 0 <= table["frame"].min() <= table["frame"].max() < count:
+            found = f"others in {folder / name}.parquet"
+            raise DataError(expected=f"frames from 0 to {count - 1} as in frames.parquet", found=found, fix=_FIX)
+    reference, board = _reference(scene, frames, folder), _board(scene, frames, folder)
+    if reference is None and board is None:
+        raise DataError(
+            expected="a clip with a reference object or a checkerboard",
+            found=f"neither in {folder}",
+            fix="choose another preset of `standoff simulate --list`",
+        )
+    return _assemble(folder, scene, truth, pairs, count, reference, board)
+
+
+def _read_scene(folder: Path) -> Mapping[str, Any]:
+    path = folder / SCENE
+    if not path.is_file():
+        fix = "give the folder that `standoff simulate` wrote"
+        raise DataError(expected="a clip folder", found=f"no {path}", fix=fix)
+    try:
+        scene = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise DataError(expected=f"JSON in {path}", found=str(error), fix=_FIX) from error
+    found = scene.get("format") if isinstance(scene, dict) else None
+    if found != FORMAT:
+        raise DataError(expected=f"a clip of format {FORMAT}", found=f"format {found} in {path}", fix=_FIX)
+    missing = [name for name in ("preset", "seed", "entities", "reference", "board") if name not in scene]
+    if missing:
+        raise DataError(expected=f"a whole {SCENE}", found=f"{path} without {', '.join(missing)}", fix=_FIX)
+    return dict(scene)
+
+
+def _reference(scene: Mapping[str, Any], frames: Columns, folder: Path) -> TrueReference | None:
+    entry = scene["reference"]
+    if entry is None:
+        return None
+    corners_px = np.stack([_lists(frames[name], 4, folder) for name in REFERENCE_PX], axis=-1)
+    return TrueReference(
+        entity_id=int(entry["entity_id"]),
+        corners_m=np.array(entry["top_m"], dtype=np.float64)[:, :2],
+        corners_px=corners_px,
+        visible_share=np.nan_to_num(frames["reference_visible_share"], nan=0.0),
+        covered=frames["reference_covered"].astype(np.bool_),
+    )
+
+
+def _board(scene: Mapping[str, Any], frames: Columns, folder: Path) -> TrueBoard | None:
+    entry = scene["board"]
+    if entry is None:
+        return None
+    corners = len(entry["corners_m"])
+    side = round(corners**0.5)
+    if side * side != corners or side < 3:
+        found = f"{corners} in {folder / SCENE}"
+        raise DataError(expected="a square board of at least 3x3 inner corners", found=found, fix=_FIX)
+    corners_px = np.stack([_lists(frames[f"board_{axis}_px"], corners, folder) for axis in "xy"], axis=-1)
+    return TrueBoard(side, float(entry["square_m"]), corners_px.reshape(-1, side, side, 2))
+
+
+def _lists(column: Any, length: int, folder: Path) -> FloatArray:  # noqa: ANN401 - numpy's object arrays have no type
+    """Return (F, length) of a column of lists."""
+    rows = [np.asarray(row, dtype=np.float64) for row in column]
+    if any(len(row) != length for row in rows):
+        found = f"another number in frames.parquet of {folder}"
+        raise DataError(expected=f"{length} corners in every frame", found=found, fix=_FIX)
+    return np.stack(rows)
+
+
+def _assemble(
+    folder: Path,
+    scene: Mapping[str, Any],
+    truth: Columns,
+    pairs: Columns,
+    count: int,
+    reference: TrueReference | None,
+    board: TrueBoard | None,
+) -> Clip:
+    entity_ids, rows = np.unique(truth["entity_id"], return_inverse=True)
+    everything = np.full((count, len(entity_ids), 6), np.nan)
+    columns = [truth[name] for name in ("x1_px", "y1_px", "x2_px", "y2_px", "x_m", "y_m")]
+    everything[truth["frame"], rows] = np.column_stack(columns)
+    class_id = np.zeros(len(entity_ids), dtype=np.int64)
+    class_id[rows] = truth["class_id"]
+    own = np.array([CLASSES[k].role is not Role.REFERENCE for k in class_id], dtype=np.bool_)
+    reference_box = np.full((count, 4), np.nan)
+    if reference is not None:
+        of_reference = np.flatnonzero(entity_ids == reference.entity_id)
+        if len(of_reference) != 1:
+            raise DataError(expected="the reference object in truth.parquet", found=f"none in {folder}", fix=_FIX)
+        reference_box = everything[:, of_reference[0], :4]
+    which, distance_m = _distances(pairs, entity_ids[own], class_id[own], count)
+    return Clip(
+        folder=folder,
+        preset=str(scene["preset"]),
+        seed=int(scene["seed"]),
+        frame_count=count,
+        entity_id=entity_ids[own].astype(np.int64),
+        class_id=class_id[own],
+        box_px=everything[:, own, :4],
+        xy_m=everything[:, own, 4:],
+        reference_box_px=reference_box,
+        pairs=which,
+        distance_m=distance_m,
+        reference=reference,
+        board=board,
+    )
+
+
+def _distances(pairs: Columns, entity_id: IntArray, class_id: IntArray, count: int) -> tuple[IntArray, FloatArray]:
+    """Return (P, 2) rows of person and machine, and (F, P) their true distances."""
+    person = np.array([CLASSES[k].role is Role.PERSON for k in class_id], dtype=np.bool_)
+    which = np.array([(a, b) for a in np.flatnonzero(person) for b in np.flatnonzero(~person)], dtype=np.int64)
+    which = which.reshape(-1, 2)
+    square = np.full((count, len(entity_id), len(entity_id)), np.nan)
+    first, second = (np.searchsorted(entity_id, pairs[name]) for name in ("entity_a", "entity_b"))
+    square[pairs["frame"], first, second] = square[pairs["frame"], second, first] = pairs["centre_m"]
+    return which, square[:, which[:, 0], which[:, 1]]

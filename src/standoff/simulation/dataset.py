@@ -1,0 +1,229 @@
+"""Pictures of many independent scenes for training, split by scene, in YOLO's or COCO's layout."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Generator, Sequence
+from contextlib import closing, contextmanager
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Literal
+
+import cv2
+import numpy as np
+import yaml
+
+from standoff.core.classes import CLASSES
+from standoff.simulation.casting import random_plan
+from standoff.simulation.coco import Annotations
+from standoff.simulation.crew import work_through
+from standoff.simulation.flight import Still, drone_camera
+from standoff.simulation.moment import scene_at
+from standoff.simulation.output import whole_folder
+from standoff.simulation.presets import check_seed, check_size
+from standoff.simulation.site import Site, build_site
+from standoff.simulation.studio import Studio
+from standoff.simulation.truth import Row
+
+SPLITS = ("train", "val", "test")
+_MIN_VISIBLE_PX = 12
+_MIN_VISIBLE_SHARE = 0.15
+"""What shows less than this is left unmarked: a person who marks pictures would not see it."""
+
+
+@dataclass(frozen=True, slots=True)
+class DatasetPlan:
+    """What to render.
+
+    Attributes:
+        images: How many in all.
+        per_scene: Pictures of each scene.
+        width_px: Of the pictures.
+        height_px: Of the pictures.
+        layout: Of the annotations.
+        held_out: Share of scenes for each of val and test.
+        seed: Of everything random.
+        excavator_mesh: Folder of mesh parts for a third of the excavators, or None.
+
+    Raises:
+        ConfigError: A size or seed out of range.
+    """
+
+    images: int
+    per_scene: int
+    width_px: int
+    height_px: int
+    layout: Literal["yolo", "coco"]
+    held_out: float
+    seed: int
+    excavator_mesh: Path | None = None
+
+    def __post_init__(self) -> None:
+        check_seed(self.seed)
+        check_size(self.width_px, self.height_px)
+
+    @property
+    def scenes(self) -> int:
+        """Return how many scenes it takes."""
+        return -(-self.images // self.per_scene)
+
+    def split_of(self, scene: int) -> str:
+        """Return the split of a scene: the held-out ones come first in a fixed shuffled order.
+
+        One scene alone is all train.
+        """
+        order = np.random.default_rng([self.seed, 15485863]).permutation(self.scenes)
+        place = int(np.flatnonzero(order == scene)[0])
+        held_out = round(self.held_out * self.scenes)
+        return "val" if place < held_out else "test" if place < 2 * held_out else "train"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Picture:
+    """One picture of a dataset.
+
+    Attributes:
+        name: Of the file, without folder.
+        jpeg: Its content.
+        size_px: (width, height).
+        entities: Rows of `truth.TRUTH_SCHEMA` that somebody would mark.
+        scene: Index of its scene.
+    """
+
+    name: str
+    jpeg: bytes
+    size_px: tuple[int, int]
+    entities: list[Row]
+    scene: int
+
+
+def record_dataset(
+    plan: DatasetPlan,
+    out: Path,
+    *,
+    overwrite: bool = False,
+    processes: int = 2,
+    on_picture: Callable[[], None] | None = None,
+) -> None:
+    """Render the pictures and write them with their labels.
+
+    Args:
+        plan: What to render.
+        out: The folder; appears when all is done.
+        overwrite: Replace an existing folder.
+        processes: That render side by side.
+        on_picture: Called after each picture.
+
+    Raises:
+        OutputError: The folder cannot be used.
+        MissingDependency: No OpenGL.
+    """
+    with whole_folder(out, overwrite=overwrite) as folder:
+        annotations = {split: Annotations() for split in SPLITS}
+        for split in SPLITS:
+            (folder / "images" / split).mkdir(parents=True)
+            if plan.layout == "yolo":
+                (folder / "labels" / split).mkdir(parents=True)
+        jobs = range(plan.scenes)
+        scenes = work_through(partial(open_scene_shooter, plan), jobs, processes=min(processes, len(jobs)))
+        with closing(scenes):
+            for scene, pictures in enumerate(scenes):
+                split = plan.split_of(scene)
+                for picture in pictures:
+                    (folder / "images" / split / picture.name).write_bytes(picture.jpeg)
+                    if plan.layout == "yolo":
+                        label = folder / "labels" / split / Path(picture.name).with_suffix(".txt")
+                        label.write_text("".join(yolo_line(row, picture.size_px) for row in picture.entities))
+                    else:
+                        entry = {"file_name": f"images/{split}/{picture.name}", "scene": scene}
+                        annotations[split].add(entry, picture.entities, picture.size_px, None)
+                    if on_picture is not None:
+                        on_picture()
+        _describe(plan, folder, annotations)
+
+
+def _describe(plan: DatasetPlan, folder: Path, annotations: dict[str, Annotations]) -> None:
+    if plan.layout == "coco":
+        (folder / "annotations").mkdir()
+        for split in SPLITS:
+            text = json.dumps(annotations[split].to_dict(f"standoff simulated sites, seed {plan.seed}, {split}"))
+            (folder / "annotations" / f"{split}.json").write_text(text)
+    names = {site_class.id: site_class.name for site_class in CLASSES}
+    content = {**{split: f"images/{split}" for split in SPLITS}, "names": names}
+    (folder / "data.yaml").write_text(yaml.safe_dump(content, sort_keys=False))
+    settings = {"images": plan.images, "per_scene": plan.per_scene, "seed": plan.seed, "scenes": plan.scenes}
+    (folder / "dataset.json").write_text(json.dumps(settings))
+
+
+def yolo_line(row: Row, size_px: tuple[int, int]) -> str:
+    """Return one line of a YOLO label file: class, centre and size as shares of the picture.
+
+    >>> yolo_line({"class_id": 2, "x1_px": -0.5, "y1_px": -0.5, "x2_px": 9.5, "y2_px": 4.5}, (20, 10))
+    '2 0.250000 0.250000 0.500000 0.500000\\n'
+    """
+    left, top, right, bottom = (row[f"{name}_px"] + 0.5 for name in ("x1", "y1", "x2", "y2"))
+    width_px, height_px = size_px
+    shares = (
+        (left + right) / 2 / width_px,
+        (top + bottom) / 2 / height_px,
+        (right - left) / width_px,
+        (bottom - top) / height_px,
+    )
+    return f"{row['class_id']} " + " ".join(f"{share:.6f}" for share in shares) + "\n"
+
+
+@contextmanager
+def open_scene_shooter(plan: DatasetPlan) -> Generator[Callable[[int], list[Picture]], None, None]:
+    """Give a function from a scene's index to its pictures."""
+    studio: Studio | None = None
+
+    def shoot(scene: int) -> list[Picture]:
+        nonlocal studio
+        rng = np.random.default_rng([plan.seed, 49979687, scene])
+        site = build_site(random_plan(rng, plan.width_px, plan.height_px, plan.excavator_mesh))
+        if studio is None:
+            studio = Studio(site)
+        count = min(plan.per_scene, plan.images - scene * plan.per_scene)
+        return [_shoot(studio, site, plan, rng, scene, index) for index in range(count)]
+
+    try:
+        yield shoot
+    finally:
+        if studio is not None:
+            studio.close()
+
+
+def _shoot(
+    studio: Studio, site: Site, plan: DatasetPlan, rng: np.random.Generator, scene: int, index: int
+) -> Picture:
+    time_s = rng.uniform(0.0, site.duration_s)
+    flight = _look_at_somebody(site, plan, rng, time_s)
+    studio.show(replace(site, scene=replace(site.scene, flight=flight)))
+    shot = studio.shoot(index, time_s)
+    quality = int(rng.choice([60, 75, 85, 92, 95]))
+    coded, jpeg = cv2.imencode(".jpg", shot.image, [cv2.IMWRITE_JPEG_QUALITY, quality])
+    assert coded
+    seen = [
+        row
+        for row in shot.entities
+        if row["visible_px"] >= _MIN_VISIBLE_PX and row["visible_share"] >= _MIN_VISIBLE_SHARE
+    ]
+    name = f"{plan.seed}-{scene:05d}-{index:02d}.jpg"
+    return Picture(name, jpeg.tobytes(), (plan.width_px, plan.height_px), seen, scene)
+
+
+def _look_at_somebody(site: Site, plan: DatasetPlan, rng: np.random.Generator, time_s: float) -> Still:
+    """Put the camera where one of the actors is in the picture, from any height and side."""
+    bodies = scene_at(site.scene, time_s).bodies
+    target = bodies[rng.integers(len(bodies))].centre_m if bodies else np.zeros(3)
+    camera = drone_camera(plan.width_px, plan.height_px, rng.uniform(45.0, 84.0), rng)
+    pitch_deg = rng.choice([rng.uniform(20.0, 45.0), rng.uniform(45.0, 75.0), rng.uniform(75.0, 90.0)], p=[0.4, 0.4, 0.2])
+    return Still.over(
+        camera,
+        target[:2] + rng.normal(0.0, 4.0, 2),
+        altitude_m=float(15.0 * 4.0 ** rng.beta(1.0, 1.6)),
+        pitch_deg=float(pitch_deg),
+        heading_deg=float(rng.uniform(0.0, 360.0)),
+        roll_deg=float(rng.normal(0.0, 1.0)),
+    )

@@ -1,0 +1,1 @@
+"""Everything that stands on a site and is not named in the truth."""

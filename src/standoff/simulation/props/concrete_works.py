@@ -1,0 +1,298 @@
+"""Works in progress: footings with starter bars, column stubs, walls in formwork, strips, rebar mats and cages."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from standoff.simulation.mesh import Colour, Mesh, Surface, cylinder, join, rotation, srgb, translation
+from standoff.simulation.props.materials import (
+    BARE_STEEL,
+    CONCRETE,
+    FILM_FACED_PLY,
+    FORMWORK_RED,
+    FORMWORK_YELLOW,
+    FRESH_CONCRETE,
+    GALVANISED,
+    RUSTY_STEEL,
+    WOODS,
+    bar,
+    block,
+    laid,
+    scattered,
+    single,
+    tints,
+    toned,
+    varied,
+)
+from standoff.simulation.props.prop import Prop
+from standoff.simulation.scene import Batch, place
+
+_SKIRT_M = 0.6
+"""Concrete reaches this deep, so that it does not hang over a slope."""
+_CAPS = (srgb("#d5691c"), srgb("#c93a22"), srgb("#d7b423"))
+
+
+def poured(size_m: tuple[float, float, float], colour: Colour = CONCRETE) -> Mesh:
+    """Return a concrete block whose foot is in the ground, a little stained."""
+    deep = block((size_m[0], size_m[1], size_m[2] + _SKIRT_M), colour, Surface.CONCRETE).at(0.0, 0.0, -_SKIRT_M)
+    return deep
+
+
+def starters(
+    rng: np.random.Generator, size_m: tuple[float, float], z_m: float, length_m: float, pitch_m: float
+) -> list[Mesh]:
+    """Return bars standing along the outline of a rectangle, slightly bent, some with a coloured cap."""
+    half = np.array(size_m) / 2
+    counts = np.maximum(np.round(2 * half / pitch_m).astype(int), 1)
+    xs, ys = np.linspace(-half[0], half[0], counts[0] + 1), np.linspace(-half[1], half[1], counts[1] + 1)
+    feet = {(x, y) for x in xs for y in (ys[0], ys[-1])} | {(x, y) for x in (xs[0], xs[-1]) for y in ys}
+    capped = rng.uniform() < 0.4
+    cap = _CAPS[int(rng.integers(len(_CAPS)))]
+    bars = []
+    for x, y in sorted(feet):
+        lean = rng.normal(0.0, 0.03, 2) * length_m
+        top = (x + lean[0], y + lean[1], z_m + length_m * rng.uniform(0.85, 1.05))
+        bars.append(toned(bar((x, y, z_m), top, 0.016, RUSTY_STEEL, Surface.RUST, sections=4, capped=False),
+                          rng.uniform(0.7, 1.2)))  # fmt: skip
+        if capped:
+            bars.append(block((0.09, 0.09, 0.07), cap, Surface.PLASTIC).at(*top))
+    return bars
+
+
+@varied
+def footing(rng: np.random.Generator) -> Mesh:
+    """Return a low footing with a column stub or starter bars."""
+    side, height = rng.uniform(1.0, 2.4), rng.uniform(0.15, 0.6)
+    colour = CONCRETE if rng.uniform() < 0.6 else FRESH_CONCRETE
+    parts = [poured((side, side * rng.uniform(0.8, 1.2), height), colour)]
+    stub = side * rng.uniform(0.22, 0.35)
+    top = height
+    if rng.uniform() < 0.6:
+        top = height + rng.uniform(0.1, 0.9)
+        parts.append(toned(block((stub + 0.1, stub + 0.1, top - height), colour, Surface.CONCRETE).at(0, 0, height), 0.9))
+    parts += starters(rng, (stub, stub), top, rng.uniform(0.5, 1.3), 0.16)
+    return join(parts)
+
+
+@varied
+def _column(rng: np.random.Generator) -> Mesh:
+    side, height = rng.uniform(0.3, 0.5), rng.uniform(1.3, 3.2)
+    parts = [poured((side, side, height))]
+    parts += starters(rng, (side - 0.1, side - 0.1), height, rng.uniform(0.6, 1.1), 0.15)
+    return join(parts)
+
+
+def _panel(size_m: tuple[float, float], frame: Colour, face: Colour) -> Mesh:
+    width, height = size_m
+    parts = [block((width, 0.03, height), face, Surface.WOOD).at(0.0, 0.05, 0.0)]
+    for x in np.linspace(-width / 2 + 0.04, width / 2 - 0.04, 4):
+        parts.append(block((0.06, 0.1, height), frame, Surface.PAINT).at(float(x), -0.01, 0.0))
+    for z in np.linspace(0.0, height - 0.08, 4):
+        parts.append(block((width, 0.1, 0.07), frame, Surface.PAINT).at(0.0, -0.01, float(z)))
+    return join(parts)
+
+
+def _brace(x_m: float, height_m: float, reach_m: float) -> Mesh:
+    return join([
+        bar((x_m, -0.05, 0.8 * height_m), (x_m, -reach_m, 0.0), 0.035, FORMWORK_RED, Surface.PAINT),
+        bar((x_m, -0.05, 0.25 * height_m), (x_m, -reach_m, 0.05), 0.03, GALVANISED),
+        block((0.25, 0.25, 0.03), GALVANISED, Surface.STEEL).at(x_m, -reach_m, 0.0),
+    ])  # fmt: skip
+
+
+@varied
+def _column_form(rng: np.random.Generator) -> Mesh:
+    side, height = rng.uniform(0.45, 0.7), rng.uniform(2.4, 3.3)
+    frame = FORMWORK_YELLOW if rng.uniform() < 0.5 else FORMWORK_RED
+    faces = [_panel((side, height), frame, FILM_FACED_PLY).at(0.0, -side / 2, 0.0).moved(rotation("z", turn))
+             for turn in (0.0, 90.0, 180.0, 270.0)]  # fmt: skip
+    braces = [_brace(0.0, height, 1.3).moved(rotation("z", turn)) for turn in (0.0, 90.0)]
+    return join([*faces, *braces, *starters(rng, (side - 0.2, side - 0.2), height - 0.2, 0.9, 0.15)])
+
+
+@varied
+def _wall_form(rng: np.random.Generator) -> Mesh:
+    panels, width, height = int(rng.integers(3, 6)), rng.uniform(0.9, 1.35), rng.uniform(1.5, 2.7)
+    frame = (FORMWORK_YELLOW, FORMWORK_RED, srgb("#3a5f8c"))[int(rng.integers(3))]
+    parts = []
+    length = panels * width
+    for number in range(panels):
+        x = (number + 0.5) * width - length / 2
+        face = toned(_panel((width - 0.02, height), frame, FILM_FACED_PLY), rng.uniform(0.7, 1.1))
+        parts.append(face.at(x, -0.2, 0.0))
+        if rng.uniform() < 0.6:
+            parts.append(face.moved(rotation("z", 180.0)).at(x, 0.2, 0.0))
+        parts.append(_brace(x, height, rng.uniform(1.2, 1.7)).at(0.0, -0.2, 0.0))
+    parts += starters(rng, (length - 0.3, 0.2), 0.0, height + rng.uniform(0.1, 0.6), 0.25)
+    return join(parts)
+
+
+@varied
+def _wall(rng: np.random.Generator) -> Mesh:
+    length, height = rng.uniform(2.5, 6.0), rng.uniform(0.6, 2.4)
+    parts = [poured((length, 0.25, height))]
+    if rng.uniform() < 0.5:
+        wing = rng.uniform(1.5, 3.0)
+        parts.append(toned(poured((0.25, wing, height * 0.999)), 0.93).at((0.25 - length) / 2, wing / 2 - 0.125, 0.0))
+    parts += starters(rng, (length - 0.2, 0.15), height, rng.uniform(0.4, 0.9), 0.25)
+    return join(parts)
+
+
+@varied
+def _strip(rng: np.random.Generator) -> Mesh:
+    length, height = rng.uniform(4.0, 8.0), rng.uniform(0.12, 0.45)
+    wood = WOODS[int(rng.integers(len(WOODS)))]
+    parts = [poured((length, rng.uniform(0.4, 0.7), height), FRESH_CONCRETE)]
+    for side in (-0.4, 0.4):
+        parts.append(block((length + 0.1, 0.035, height + 0.05), wood, Surface.WOOD).at(0.0, side, 0.0))
+        for x in np.arange(-length / 2 + 0.3, length / 2, 1.2):
+            parts.append(block((0.05, 0.05, 0.5), wood, Surface.WOOD).at(float(x), 1.1 * side, 0.0))
+    parts += starters(rng, (length - 0.3, 0.2), height, rng.uniform(0.3, 0.7), 0.5)
+    return join(parts)
+
+
+@varied
+def _deck(rng: np.random.Generator) -> Mesh:
+    """A slab in its edge boards, half of it still bare mats on blinding."""
+    length, width, height = rng.uniform(5.0, 8.0), rng.uniform(4.0, 6.0), rng.uniform(0.12, 0.3)
+    wood = WOODS[int(rng.integers(len(WOODS)))]
+    parts = [toned(poured((length, width, 0.04), CONCRETE), 1.1)]
+    poured_length = length * rng.uniform(0.35, 0.7)
+    parts.append(poured((poured_length, width, height), FRESH_CONCRETE).at((poured_length - length) / 2, 0.0, 0.0))
+    for side in (-1, 1):
+        parts.append(block((length + 0.1, 0.04, height + 0.06), wood, Surface.WOOD).at(0.0, side * width / 2, 0.0))
+    bare = length - poured_length
+    parts.append(_lattice((bare, width - 0.1), 0.3, 0.014, rng).at(poured_length / 2, 0.0, 0.12))
+    for x in (-0.3, 0.3):
+        parts += [laid(join(starters(rng, (0.3, 0.3), height, 0.9, 0.15)), x * length, y * width, 0.0, 0.0)
+                  for y in (-0.25, 0.25)]  # fmt: skip
+    return join(parts)
+
+
+def _lattice(size_m: tuple[float, float], pitch_m: float, radius_m: float, rng: np.random.Generator) -> Mesh:
+    length, width = size_m
+    bars = []
+    for y in np.arange(-width / 2 + 0.05, width / 2, pitch_m):
+        bars.append(bar((-length / 2, y, 0.02), (length / 2, y + rng.normal(0.0, 0.01), 0.02), radius_m,
+                        RUSTY_STEEL, Surface.RUST, sections=3, capped=False))  # fmt: skip
+    for x in np.arange(-length / 2 + 0.05, length / 2, pitch_m):
+        bars.append(bar((x, -width / 2, 0.035), (x + rng.normal(0.0, 0.01), width / 2, 0.035), radius_m,
+                        RUSTY_STEEL, Surface.RUST, sections=3, capped=False))  # fmt: skip
+    return join([toned(one, rng.uniform(0.7, 1.2)) for one in bars])
+
+
+@varied
+def _mat(rng: np.random.Generator) -> Mesh:
+    return _lattice((rng.uniform(2.5, 5.0), rng.uniform(1.8, 2.3)), rng.uniform(0.15, 0.25), 0.011, rng)
+
+
+def _mats(rng: np.random.Generator) -> tuple[Batch, ...]:
+    """A stack of mats that slid, on two timbers."""
+    count = int(rng.integers(1, 9))
+    poses = scattered(rng, rng.normal(0.0, 0.05, (count, 2)), 0.1 + 0.028 * np.arange(count), 1.0)
+    turn = np.deg2rad(rng.normal(0.0, 1.5, count))
+    poses[:, 0, 0] = poses[:, 1, 1] = np.cos(turn)
+    poses[:, 1, 0], poses[:, 0, 1] = np.sin(turn), -np.sin(turn)
+    feet = np.stack([translation(x, 0.0, 0.0) for x in (-0.9, 0.9)])
+    return (place(_mat(int(rng.integers(4))), poses, dust=0.3), place(_timber_bearer(0), feet, tint=tints(rng, WOODS, 2)))
+
+
+@varied
+def _timber_bearer(_: np.random.Generator) -> Mesh:
+    return block((0.1, 2.2, 0.1), None, Surface.WOOD)
+
+
+@varied
+def _rebar_bundle(rng: np.random.Generator) -> Mesh:
+    length = rng.uniform(3.5, 7.0)
+    parts = [block((0.1, 0.9, 0.1), WOODS[2], Surface.WOOD).at(x * length, 0.0, 0.0) for x in (-0.3, 0.3)]
+    for _ in range(int(rng.integers(16, 40))):
+        y, z = rng.normal(0.0, 0.16), 0.12 + abs(rng.normal(0.0, 0.06))
+        shift, skew = rng.normal(0.0, 0.12), rng.normal(0.0, 0.05)
+        steel = bar((shift - length / 2, y, z), (shift + length / 2, y + skew, z), 0.016, RUSTY_STEEL, Surface.RUST,
+                    sections=3, capped=False)  # fmt: skip
+        parts.append(toned(steel, rng.uniform(0.65, 1.25)))
+    return join(parts)
+
+
+@varied
+def _cage(rng: np.random.Generator) -> Mesh:
+    length, side = rng.uniform(3.0, 6.0), rng.uniform(0.35, 0.6)
+    corners = [(y * side / 2, z * side / 2) for y, z in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    middles = [(0.0, -side / 2), (side / 2, 0.0), (0.0, side / 2), (-side / 2, 0.0)]
+    lift = side / 2 + 0.08
+    parts = [
+        toned(bar((-length / 2, y, z + lift), (length / 2, y, z + lift), 0.014, RUSTY_STEEL, Surface.RUST, sections=3,
+                  capped=False), rng.uniform(0.7, 1.2))
+        for y, z in corners + middles
+    ]  # fmt: skip
+    for x in np.arange(-length / 2 + 0.1, length / 2, 0.24):
+        for (y0, z0), (y1, z1) in zip(corners, corners[1:] + corners[:1], strict=True):
+            parts.append(bar((x, y0, z0 + lift), (x, y1, z1 + lift), 0.008, RUSTY_STEEL, Surface.RUST, sections=3,
+                             capped=False))  # fmt: skip
+    return join(parts)
+
+
+@varied
+def _standing_cage(rng: np.random.Generator) -> Mesh:
+    cage = _cage(int(rng.integers(100)))
+    top = float(cage.vertices_m[:, 0].max())
+    upright = cage.at(0.0, 0.0, -float(cage.vertices_m[:, 2].mean())).moved(rotation("y", -90.0))
+    low = upright.at(0.0, 0.0, 0.45 * top)
+    return low.at(0.0, 0.0, -float(low.vertices_m[:, 2].min()))
+
+
+@varied
+def _shoring(rng: np.random.Generator) -> Mesh:
+    """A trench box: two steel sheets held apart by struts, standing on the ground before it goes in."""
+    length, height, gap = rng.uniform(2.4, 3.6), rng.uniform(1.2, 2.2), rng.uniform(0.9, 1.4)
+    colour = (FORMWORK_YELLOW, FORMWORK_RED, srgb("#4c6b8a"), BARE_STEEL)[int(rng.integers(4))]
+    parts = []
+    for side in (-1, 1):
+        parts.append(block((length, 0.1, height), colour, Surface.PAINT).at(0.0, side * gap / 2, 0.0))
+        parts += [block((0.14, 0.16, height + 0.1), colour, Surface.PAINT).at(x * length, side * gap / 2, 0.0)
+                  for x in (-0.45, 0.0, 0.45)]  # fmt: skip
+    for x in (-0.4, 0.4):
+        for z in (0.3, 0.8):
+            strut = cylinder(0.06, gap, BARE_STEEL, axis="y", sections=8)
+            parts.append(strut.at(x * length, 0.0, z * height))
+    return join(parts)
+
+
+@varied
+def _shoring_boards(rng: np.random.Generator) -> Mesh:
+    """Boards driven along a trench: an uneven palisade with walings."""
+    length = rng.uniform(3.0, 6.0)
+    parts = []
+    for x in np.arange(-length / 2, length / 2, 0.27):
+        board = block((0.25, 0.05, rng.uniform(0.5, 1.0)), WOODS[int(rng.integers(len(WOODS)))], Surface.WOOD)
+        parts.append(toned(board, rng.uniform(0.7, 1.0)).at(float(x), rng.normal(0.0, 0.015), 0.0))
+    parts.append(block((length, 0.12, 0.15), WOODS[2], Surface.WOOD).at(0.0, -0.09, 0.25))
+    return join(parts)
+
+
+def _footing_rows(rng: np.random.Generator) -> tuple[Batch, ...]:
+    """Rows of equal footings on the building's grid, as most foundation works show them."""
+    rows, columns, pitch = int(rng.integers(1, 3)), int(rng.integers(2, 4)), rng.uniform(3.2, 4.2)
+    x, y = np.meshgrid((np.arange(columns) - (columns - 1) / 2) * pitch, (np.arange(rows) - (rows - 1) / 2) * pitch)
+    poses = np.stack([translation(*xy, 0.0) for xy in np.stack([x.ravel(), y.ravel()], axis=-1)])
+    works = footing(int(rng.integers(8)))
+    return (place(works, poses, tint=(1.0, 1.0, 1.0), dust=rng.uniform(0.1, 0.6, len(poses))),)
+
+
+CONCRETE_WORKS: tuple[Prop, ...] = (
+    single("footing", 1.8, 2.0, footing, variants=8),
+    Prop("footing rows", 6.5, _footing_rows, 1.2),
+    single("column stub", 0.8, 1.2, _column),
+    single("column in formwork", 1.8, 0.9, _column_form),
+    single("wall in formwork", 3.6, 0.9, _wall_form),
+    single("concrete wall", 3.6, 0.7, _wall),
+    single("strip foundation", 4.2, 1.0, _strip),
+    single("slab", 5.2, 0.8, _deck),
+    Prop("rebar mats", 2.9, _mats, 1.6),
+    single("rebar bundle", 3.7, 1.5, _rebar_bundle, stretch=0.05),
+    single("lying cage", 3.2, 1.0, _cage, stretch=0.05),
+    single("standing cage", 0.6, 0.7, _standing_cage, stretch=0.05),
+    single("trench box", 2.0, 0.5, _shoring),
+    single("shoring boards", 3.2, 0.6, _shoring_boards),
+)

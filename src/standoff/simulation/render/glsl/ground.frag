@@ -1,0 +1,34 @@
+in vec3 v_offset, v_normal;
+in vec2 v_xy;
+uniform sampler2D picture, noise;
+uniform vec4 extent;  // south-west corner and size of the grid
+out vec4 radiance;
+
+void main() {
+    float away = length(v_offset);
+    vec3 to_eye = -v_offset / away;
+    vec2 place = (v_xy - extent.xy) / extent.zw;
+    // Outside the grid the picture goes on mirrored, and fades to its own mean.
+    vec2 folded = 1.0 - abs(fract(0.5 * place) * 2.0 - 1.0);
+    vec2 outside = max(abs(place - 0.5) - 0.5, 0.0) * extent.zw;
+    float far = 1.0 - exp(-0.02 * (outside.x + outside.y));
+    vec4 base = texture(picture, folded, 6.0 * far);
+    vec3 albedo = base.rgb * base.rgb;
+    float wet = base.a * (1.0 - far);
+    vec4 fine = texture(noise, v_xy * 0.29);
+    vec4 broad = texture(noise, mat2(0.81, 0.59, -0.59, 0.81) * v_xy * 0.043);
+    float puddle = smoothstep(0.72, 0.9, wet + 0.15 * (broad.r - 0.5));
+    float rough = 1.0 - puddle;
+    albedo *= 1.0 + rough * (0.75 * (fine.r - 0.5) + 0.5 * (broad.r - 0.5));
+    float stone = fine.g * smoothstep(0.35, 0.75, broad.g + broad.r);
+    albedo = mix(albedo, mix(albedo, vec3(dot(albedo, vec3(0.3, 0.5, 0.2))), 0.6) * (0.9 + 0.9 * fine.r), 0.55 * stone * rough);
+    albedo *= mix(1.0, 0.42, smoothstep(0.05, 0.7, wet));
+    vec3 normal = normalize(v_normal);
+    normal = normalize(normal - rough * vec3(1.5 * (fine.ba - 0.5) + 0.5 * (broad.ba - 0.5), 0.0));
+    normal = normalize(mix(normal, vec3(0.0, 0.0, 1.0), puddle));
+    float roughness = mix(mix(0.95, 0.45, smoothstep(0.2, 0.8, wet)), 0.07, puddle);
+    float open = texture(openness, gl_FragCoord.xy * openness_scale).r;
+    float lit = dot(normal, to_sun) > 0.0 ? sunlit(v_offset, normalize(v_normal)) : 0.0;
+    vec3 light = shade(clamp(albedo, 0.0, 0.9), normal, to_eye, roughness, 0.0, lit, open);
+    radiance = vec4(min(hazy(light, away), vec3(30.0)), 1.0);
+}

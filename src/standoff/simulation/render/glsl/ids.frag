@@ -1,0 +1,6 @@
+flat in uint v_id;
+out uint id;
+
+void main() {
+    id = v_id;
+}

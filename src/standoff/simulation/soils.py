@@ -1,0 +1,177 @@
+"""Soil as it looks from above: tones and wetness that follow the relief, several soils, grass, all as one picture."""
+
+from __future__ import annotations
+
+import itertools
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from standoff.simulation.canvas import Canvas, Picture, fractal
+from standoff.simulation.ground_marks import draw_prints, paint_blots, paint_lines
+from standoff.simulation.mesh import Float32Array
+from standoff.simulation.slabs import paint_slabs
+from standoff.simulation.soil_colours import PALETTES, palette_of
+from standoff.simulation.terrain_plan import Path, Soil, TerrainPlan
+
+_LONGEST_PX = 2048
+_GRASS_M = 22.0
+_SOILS = tuple(soil for soil in Soil if soil not in (Soil.MIXED, Soil.CONCRETE))
+
+
+def paint_ground(
+    rng: np.random.Generator, plan: TerrainPlan, height_m: Float32Array
+) -> tuple[Picture, npt.NDArray[np.uint8]]:
+    """Return albedo (h, w, 3) uint8 sRGB, red first, and wetness (h, w) uint8 of a shaped ground, row 0 in the south."""
+    canvas = Canvas.of(plan.extent_m, _LONGEST_PX)
+    coarse = Canvas.of(plan.extent_m, _LONGEST_PX // 2)
+    lows = _lows(plan, height_m, coarse)
+    wet = _wetness(rng, plan, lows)
+    prints = draw_prints(rng, canvas, plan)
+    tone = _tone(rng, plan, lows, wet, canvas)
+    grain = fractal(rng, canvas.shape, 512, 2048, gain=0.9)
+    lively = cv2.resize(10.0 + 7.0 * np.clip(fractal(rng, coarse.shape, 6, 96), -1.0, 1.5), canvas.shape[::-1])
+    tone += grain * lively
+    tone += _pebbles(rng, canvas, plan)
+    faded = cv2.resize(np.clip(0.75 + 0.5 * fractal(rng, coarse.shape, 8, 64), 0.0, 1.2), canvas.shape[::-1])
+    tone += cv2.subtract(prints, 128.0, dtype=cv2.CV_32F) * faded
+    levels = cv2.convertScaleAbs(np.maximum(tone, 0.0))
+    albedo = _soils(rng, plan, coarse, levels, grain)
+    _grow(rng, plan, coarse, levels, albedo)
+    _drift(rng, albedo)
+    paint_blots(rng, canvas, levels, albedo)
+    paint_slabs(rng, canvas, plan.slabs, albedo)
+    paint_lines(rng, canvas, albedo)
+    wetness = cv2.resize(cv2.convertScaleAbs(wet, alpha=255.0), canvas.shape[::-1], interpolation=cv2.INTER_CUBIC)
+    return albedo, np.asarray(wetness, np.uint8)
+
+
+def _lows(plan: TerrainPlan, height_m: Float32Array, canvas: Canvas) -> Float32Array:
+    """Return how far the ground lies below its surroundings, metres, at the picture's scale."""
+    low_m = cv2.subtract(cv2.GaussianBlur(height_m, None, 1.8 / plan.cell_m), height_m)
+    step = 1.0 / (canvas.px_per_m * plan.cell_m)
+    to_grid = np.array([[step, 0.0, 0.5 * step], [0.0, step, 0.5 * step]])
+    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+    resampled = cv2.warpAffine(low_m, to_grid, canvas.shape[::-1], flags=flags, borderMode=cv2.BORDER_REPLICATE)
+    return np.asarray(resampled, np.float32)
+
+
+def _wetness(rng: np.random.Generator, plan: TerrainPlan, lows: Float32Array) -> Float32Array:
+    """Return 0 dry .. 1 under water: water gathers in the lows, dampness spreads around it."""
+    gathers = np.clip(lows, -0.15, 0.12) / 0.05
+    gathers += 0.5 * fractal(rng, (lows.shape[0], lows.shape[1]), 4, 256, gain=0.65)
+    sample = gathers[::8, ::8]
+    damp_from, damp_full = np.quantile(sample, [0.95 - 0.75 * plan.moisture, 0.995])
+    damp = np.clip((gathers - damp_from) / max(float(damp_full - damp_from), 1e-3), 0.0, 1.0)
+    wet = (0.25 + 0.4 * plan.moisture) * damp
+    if plan.puddles > 0.0:
+        shore = np.quantile(sample, 1.0 - plan.puddles)
+        wet = np.maximum(wet, np.clip((gathers - shore) / 0.08, 0.0, 1.0))
+    return np.asarray(wet, np.float32)
+
+
+def _tone(
+    rng: np.random.Generator, plan: TerrainPlan, lows: Float32Array, wet: Float32Array, canvas: Canvas
+) -> Float32Array:
+    """Return brightness, about 0..255: dry highs pale, lows and wet ground dark, roads pale and even."""
+    shape = (lows.shape[0], lows.shape[1])
+    tone = 138.0 + 20.0 * fractal(rng, shape, 3, 48, gain=0.75) + 11.0 * fractal(rng, shape, 64, 512, gain=0.8)
+    if plan.roads:
+        lane = np.zeros(shape, np.uint8)
+        half = Canvas(shape[1], shape[0], canvas.px_per_m / 2)
+        half.draw(lane, [np.array(road) for road in plan.roads], 255, plan.road_width_m)
+        share = cv2.blur(lane, (31, 31)).astype(np.float32) / 255.0
+        share *= np.clip(1.0 + 0.35 * fractal(rng, shape, 12, 192), 0.0, 1.0)
+        tone += share * (24.0 - 0.45 * (tone - 138.0))
+    tone -= 90.0 * np.clip(lows, -0.2, 0.25)
+    tone -= 105.0 * wet
+    return np.asarray(cv2.resize(tone, canvas.shape[::-1], interpolation=cv2.INTER_LINEAR), np.float32)
+
+
+def _pebbles(rng: np.random.Generator, canvas: Canvas, plan: TerrainPlan) -> Float32Array:
+    """Return bright and dark specks, a texel or two wide: stones, clods and their shadows."""
+    heavy = np.clip((np.arange(256) - 127.5) / 127.5, -1.0, 1.0)
+    gravelly = 1.0 if plan.soil is Soil.GREY_GRAVEL else 0.6
+    spread = (128.0 + gravelly * 95.0 * np.sign(heavy) * np.abs(heavy) ** 9).astype(np.uint8)
+    white = np.frombuffer(rng.bytes(canvas.width_px * canvas.height_px), np.uint8).reshape(canvas.shape)
+    return np.asarray(cv2.subtract(cv2.LUT(white, spread), 128.0, dtype=cv2.CV_32F), np.float32)
+
+
+def _soils(
+    rng: np.random.Generator, plan: TerrainPlan, coarse: Canvas, levels: Picture, grain: Float32Array
+) -> Picture:
+    """Colour the tones: the main soil, patches of a second one, heaps and pit floors of their own."""
+    main = plan.soil if plan.soil is not Soil.MIXED else _SOILS[int(rng.integers(len(_SOILS)))]
+    other = _SOILS[int(rng.integers(len(_SOILS)))]
+    albedo = cv2.applyColorMap(levels, palette_of(main))
+    share = 0.2 if plan.soil is Soil.MIXED else 1.1
+    patchy = cv2.resize(fractal(rng, coarse.shape, 4, 256, gain=0.7), levels.shape[::-1])
+    _lay(albedo, levels, other, cv2.compare(cv2.scaleAdd(grain, 0.25, patchy), share, cv2.CMP_GT))
+    canvas = Canvas(levels.shape[1], levels.shape[0], 2 * coarse.px_per_m)
+    for heap in plan.heaps:
+        if heap.soil is not None:
+            outline = _ragged(rng, heap.centre_m, heap.radius_m)
+            _lay(albedo, levels, heap.soil, _cover(canvas, outline, grain), canvas.window(outline, 1.5))
+    subsoil = _SOILS[int(rng.integers(len(_SOILS)))]
+    blinded = rng.random() < 0.4
+    for pit in plan.pits:
+        floor = Soil.CONCRETE if blinded and rng.random() < 0.8 else subsoil
+        _lay(albedo, levels, floor, _cover(canvas, pit.outline_m, grain), canvas.window(pit.outline_m, 1.5))
+    return np.asarray(albedo, np.uint8)
+
+
+def _ragged(rng: np.random.Generator, centre_m: tuple[float, float], radius_m: float) -> Path:
+    angles = np.linspace(0.0, 2 * np.pi, 24, endpoint=False)
+    radii = radius_m * rng.uniform(0.8, 1.0, 24)
+    return tuple(
+        (float(centre_m[0] + r * np.cos(a)), float(centre_m[1] + r * np.sin(a)))
+        for a, r in zip(angles, radii, strict=True)
+    )
+
+
+def _cover(canvas: Canvas, outline_m: Path, grain: Float32Array) -> Picture:
+    """Return the window of a polygon whose edge crumbles by the grain."""
+    window = canvas.window(outline_m, 1.5)
+    mask = np.zeros(canvas.shape, np.uint8)[window]
+    corner_m = np.array([window[1].start, window[0].start]) / canvas.px_per_m
+    inset = Canvas(mask.shape[1], mask.shape[0], canvas.px_per_m)
+    middle_m = np.array([canvas.width_px - mask.shape[1], canvas.height_px - mask.shape[0]]) / (2 * canvas.px_per_m)
+    inset.fill(mask, [np.array(outline_m) + middle_m - corner_m], 255)
+    soft = cv2.blur(mask, (9, 9)).astype(np.float32)
+    return np.asarray(cv2.compare(cv2.scaleAdd(grain[window], 40.0, soft), 127.0, cv2.CMP_GT), np.uint8)
+
+
+def _lay(
+    albedo: Picture, levels: Picture, soil: Soil, mask: Picture, window: tuple[slice, slice] = (slice(None), slice(None))
+) -> None:
+    part = np.ascontiguousarray(levels[window])
+    albedo[window] = cv2.copyTo(cv2.applyColorMap(part, palette_of(soil)), mask, np.ascontiguousarray(albedo[window]))
+
+
+def _grow(rng: np.random.Generator, plan: TerrainPlan, coarse: Canvas, levels: Picture, albedo: Picture) -> None:
+    """Let grass in from the borders, and weeds into a few places inside; never on roads, tracks, slabs or pits."""
+    if plan.grass <= 0.0:
+        return
+    inwards_m = np.minimum.outer(*(np.minimum(np.arange(n), np.arange(n)[::-1]) for n in coarse.shape)) / coarse.px_per_m
+    rich = 1.0 - inwards_m / (_GRASS_M * plan.grass) + 0.9 * fractal(rng, coarse.shape, 4, 64)
+    rich = np.maximum(rich, fractal(rng, coarse.shape, 16, 128) - 3.2 + plan.grass) + 0.8 * fractal(
+        rng, coarse.shape, 256, 1024, gain=0.9
+    )
+    worn = np.zeros(coarse.shape, np.uint8)
+    lines = [np.array(path) for path in (*plan.roads, *plan.tracks, *plan.ruts)]
+    coarse.draw(worn, lines, 255, 3.2)
+    coarse.fill(worn, [area.outline_m for area in itertools.chain(plan.pits, plan.slabs)], 255)
+    rich -= cv2.blur(worn, (9, 9)) * np.float32(2.5 / 255.0)
+    mask = cv2.resize(cv2.compare(np.asarray(rich, np.float32), 0.35, cv2.CMP_GT), levels.shape[::-1])
+    health = fractal(rng, coarse.shape, 6, 512, gain=0.75)
+    blades = cv2.addWeighted(levels, 0.55, cv2.resize(cv2.convertScaleAbs(health * 30.0 + 96.0), levels.shape[::-1]), 0.6, 0.0)
+    green = cv2.applyColorMap(blades, PALETTES["grass" if rng.random() < 0.6 else "dead grass"])
+    np.copyto(albedo, np.asarray(cv2.copyTo(green, cv2.compare(mask, 127, cv2.CMP_GT), albedo)))
+
+
+def _drift(rng: np.random.Generator, albedo: Picture) -> None:
+    """Let the hue wander by a few per cent over tens of metres."""
+    gain = 128.0 + 5.0 * rng.standard_normal((7, 7, 1)) + 4.0 * rng.standard_normal((7, 7, 3))
+    field = cv2.resize(gain.astype(np.float32), albedo.shape[1::-1][:2], interpolation=cv2.INTER_CUBIC)
+    cv2.multiply(albedo, cv2.convertScaleAbs(field), albedo, scale=1.0 / 128.0)
