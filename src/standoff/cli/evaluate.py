@@ -7,11 +7,13 @@ from typing import Annotated
 
 import typer
 
+from standoff.cli import evaluate_paper
 from standoff.cli.calibrate import pattern_size
 from standoff.cli.numbers import two_integers
 from standoff.core.errors import ConfigError
 
 app = typer.Typer(help="Measure accuracy on data with known truth.", no_args_is_help=True)
+app.command("paper")(evaluate_paper.paper)
 _Json = Annotated[Path | None, typer.Option("--json", help="Also write the result as JSON; - prints only that.")]
 
 

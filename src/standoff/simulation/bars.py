@@ -51,13 +51,11 @@ def quads(corners_m: FloatArray, normals: FloatArray, colour: Colour | None, sur
         np.tile(np.array(colour or (1.0, 1.0, 1.0), dtype=np.float32), (4 * count, 1)),
         np.full(4 * count, colour is None, dtype=np.float32),
         np.full(4 * count, surface, dtype=np.uint8),
-        np.concatenate([first + [0, 1, 2], first + [0, 2, 3]], axis=1).reshape(-1, 3).astype(np.uint32),
+        (first + np.array([0, 1, 2, 0, 2, 3])).reshape(-1, 3).astype(np.uint32),
     )
 
 
-def grid(
-    points_m: FloatArray, colour: Colour | None, surface: Surface, *, shade: FloatArray | None = None
-) -> Mesh:
+def grid(points_m: FloatArray, colour: Colour | None, surface: Surface, *, shade: FloatArray | None = None) -> Mesh:
     """Return a smooth sheet through a (rows, columns, 3) grid of points.
 
     Its front: with columns along x and rows along y the upper side, with columns along x and rows up z the one
@@ -88,9 +86,7 @@ def grid(
     )
 
 
-def corrugated(
-    length_m: float, height_m: float, pitch_m: float, depth_m: float, *, rows: int = 2
-) -> FloatArray:
+def corrugated(length_m: float, height_m: float, pitch_m: float, depth_m: float, *, rows: int = 2) -> FloatArray:
     """Return the (rows, columns, 3) points of trapezoidal sheet steel along x, upright, facing -y around y = 0.
 
     >>> corrugated(1.0, 2.0, 0.25, 0.04).shape
@@ -102,9 +98,13 @@ def corrugated(
     y_m = np.array([0.5, 0.5, -0.5, -0.5])[corner % 4] * depth_m
     z_m = np.linspace(0.0, height_m, rows)
     return np.stack(
-        [np.broadcast_to(x_m, (rows, len(x_m))), np.broadcast_to(y_m, (rows, len(x_m))),
-         np.broadcast_to(z_m[:, None], (rows, len(x_m)))], axis=-1,
-    )  # fmt: skip
+        [
+            np.broadcast_to(x_m, (rows, len(x_m))),
+            np.broadcast_to(y_m, (rows, len(x_m))),
+            np.broadcast_to(z_m[:, None], (rows, len(x_m))),
+        ],
+        axis=-1,
+    )
 
 
 def lattice(

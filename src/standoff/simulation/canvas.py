@@ -63,6 +63,15 @@ class Canvas:
         for outline in outlines_m:
             cv2.fillPoly(layer, [self.pixels(outline)], value, cv2.LINE_AA, _FRACTION_BITS)
 
+    def inside(self, outline_m: Path | FloatArray, window: tuple[slice, slice]) -> Picture:
+        """Return the (rows, columns) of a window, 255 inside a polygon and 0 outside, with a soft edge."""
+        rows, columns = window
+        mask = np.zeros((rows.stop - rows.start, columns.stop - columns.start), np.uint8)
+        corner_px = np.array([columns.start, rows.start]) * 2**_FRACTION_BITS
+        pixels = (self.pixels(outline_m) - corner_px).astype(np.int32)
+        cv2.fillPoly(mask, [pixels], 255, cv2.LINE_AA, _FRACTION_BITS)
+        return mask
+
     def window(self, points_m: Path | FloatArray, margin_m: float) -> tuple[slice, slice]:
         """Return rows and columns around some points."""
         pixels = self.pixels(points_m) / 2**_FRACTION_BITS

@@ -52,7 +52,7 @@ def _roll(rng: np.random.Generator, canvas: Canvas, layer: Picture, line_m: Floa
     crawler = rng.random() < 0.4
     gauge_m, width_m = (rng.uniform(2.0, 2.5), 0.6) if crawler else (rng.uniform(1.7, 2.2), rng.uniform(0.35, 0.65))
     pitch_m, slant = (0.21, 0.0) if crawler else (rng.uniform(0.24, 0.32), rng.choice([-0.5, 0.5]))
-    pressed = int(rng.integers(8, 26)) * (1 if rng.random() < 0.45 else -1)
+    pressed = int(rng.integers(14, 44)) * (1 if rng.random() < 0.45 else -1)
     along = np.gradient(line_m, axis=0)
     along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)
     left = np.column_stack([-along[:, 1], along[:, 0]])
@@ -68,7 +68,7 @@ def _roll(rng: np.random.Generator, canvas: Canvas, layer: Picture, line_m: Floa
         )
         arm = across * width_m / 2 + ahead * slant * width_m / 2
         bars.append(np.stack([middle - arm, middle + arm], axis=1))
-    canvas.draw(layer, list(np.concatenate(bars)), _NEUTRAL - abs(pressed), 0.11)
+    canvas.draw(layer, list(np.concatenate(bars)), _NEUTRAL - int(0.8 * abs(pressed)), 0.11)
 
 
 def _smear(rng: np.random.Generator, canvas: Canvas, layer: Picture, centre_m: FloatArray) -> None:
@@ -78,7 +78,7 @@ def _smear(rng: np.random.Generator, canvas: Canvas, layer: Picture, centre_m: F
         angles = start + np.linspace(0.0, rng.uniform(0.8, 4.0), 40)
         ring_m = radius_m + rng.uniform(-1.5, 1.5)
         arc = centre_m + ring_m * np.column_stack([np.cos(angles), np.sin(angles)])
-        canvas.draw(layer, [arc], _NEUTRAL + int(rng.integers(-20, 14)), rng.uniform(0.3, 0.7))
+        canvas.draw(layer, [arc], _NEUTRAL + int(rng.integers(-26, 20)), rng.uniform(0.3, 0.7))
 
 
 def _scrape(rng: np.random.Generator, canvas: Canvas, layer: Picture, centre_m: FloatArray) -> None:
@@ -115,8 +115,8 @@ def paint_blots(rng: np.random.Generator, canvas: Canvas, levels: Picture, albed
         part = albedo[window]
         rows, columns = part.shape[:2]
         away = np.hypot.outer(np.linspace(-1.0, 1.0, rows), np.linspace(-1.0, 1.0, columns))
-        edge = 0.55 - away + 0.22 * fractal(rng, (rows, columns), 3, 64, gain=0.7)
-        cover = np.clip(edge * 5.0, 0.0, rng.uniform(0.35, 0.9)).astype(np.float32)[..., None]
+        edge = 0.55 - away + 0.25 * fractal(rng, (rows, columns), 3, 128, gain=0.85)
+        cover = np.clip(edge * 3.0, 0.0, rng.uniform(0.2, 0.7)).astype(np.float32)[..., None]
         code = _SPILLS[int(rng.integers(len(_SPILLS)))]
         colour = np.array([int(code[i : i + 2], 16) for i in (1, 3, 5)], np.float32)
         texture = 0.62 + levels[window].astype(np.float32)[..., None] / 370.0

@@ -22,11 +22,11 @@ def heap(
         colours: Mixed over the skin and the lumps.
         lumps: Pieces sticking out.
     """
-    rows, columns = 9, 13
+    rows, columns = 11, 17
     x, y = np.meshgrid(np.linspace(-1, 1, columns), np.linspace(-1, 1, rows))
     rise = np.clip(1.15 - np.abs(x) ** 2.5, 0, 1) * np.clip(1.1 - np.abs(y) ** 2.2, 0, 1)
     crest = 1.0 + 0.3 * np.sin(2.2 * x + rng.uniform(0, 6)) * np.cos(1.7 * y + rng.uniform(0, 6))
-    rough = rng.normal(0.0, 0.02 + 0.06 * size_m[2], x.shape)
+    rough = rng.normal(0.0, 0.02 + 0.08 * size_m[2], x.shape)
     height = size_m[2] * rise * crest + np.maximum(rough, -0.06)
     height[[0, -1]], height[:, [0, -1]] = -0.02, -0.02
     points = np.stack([x * size_m[0] / 2, y * size_m[1] / 2, height], axis=-1)
@@ -44,6 +44,8 @@ def _lump(
     row, column = rng.integers(2, len(points_m) - 2), rng.integers(2, points_m.shape[1] - 2)
     reach_m = 0.3 * min(size_m[:2])
     extents = tuple(float(extent) for extent in reach_m * rng.uniform([0.3, 0.15, 0.1], [1.2, 0.7, 0.35]))
-    turn = rotation("z", rng.uniform(0, 360)) @ rotation("y", rng.uniform(-35, 35)) @ rotation("x", rng.uniform(-30, 30))
+    turn = (
+        rotation("z", rng.uniform(0, 360)) @ rotation("y", rng.uniform(-35, 35)) @ rotation("x", rng.uniform(-30, 30))
+    )
     piece = box((extents[0], extents[1], extents[2]), colours[int(rng.integers(len(colours)))], Surface.CONCRETE)
     return piece.moved(translation(*points_m[row, column]) @ turn)

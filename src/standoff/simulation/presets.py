@@ -9,10 +9,10 @@ from types import MappingProxyType
 from typing import Literal
 
 from standoff.core.errors import ConfigError
+from standoff.simulation.flight import FlightStyle
+from standoff.simulation.light import Condition
 
 Style = Literal["earthworks", "foundations", "structure", "road", "yard"]
-Condition = Literal["noon", "afternoon", "low_sun", "hazy", "overcast", "dusk"]
-Motion = Literal["hover", "orbit", "pass", "hand"]
 Shape = Literal["square_footing", "quadrilateral_footing", "painted_square", "board"]
 
 MAX_SEED = 2**31 - 1
@@ -67,7 +67,7 @@ class Preset:
     altitude_m: float = 24.0
     pitch_deg: float = 52.0
     field_deg: float = 70.0
-    motion: Motion = "hover"
+    motion: FlightStyle = "hover"
     shape: Shape | None = "square_footing"
     covers: tuple[CoverPlan, ...] = ()
     style: Style = "earthworks"
@@ -118,7 +118,7 @@ PRESETS: Mapping[str, Preset] = MappingProxyType(
         ),
         "lost-reference": Preset(
             "The reference object leaves the picture and comes back.",
-            "mobile", frames=300, motion="pass", condition="overcast", style="foundations",
+            "mobile", frames=300, motion="away", condition="overcast", style="foundations",
         ),
         "night-ish": Preset(
             "Dusk: low light, high gain, noise.",

@@ -12,10 +12,11 @@ from standoff.core.homography import FloatArray
 from standoff.simulation.mesh import Float32Array
 from standoff.simulation.terrain_plan import FlatPatch, Heap, Path, Pit, Slab, TerrainPlan
 
-_WALL_RUN_M = 0.3
+_WALL_RUN_M = 0.42
+"""The diagonal of a cell: a steeper wall would show the grid's teeth."""
 _BLEND_M = 2.5
 _BORDER_M = 3.0
-_RUT_DEPTH_M = 0.11
+_RUT_DEPTH_M = 0.09
 _GAUGE_M = 2.0
 
 

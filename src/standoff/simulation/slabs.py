@@ -20,10 +20,8 @@ def paint_slabs(rng: np.random.Generator, canvas: Canvas, slabs: Sequence[Slab],
         window = canvas.window(slab.outline_m, 0.5)
         part = albedo[window]
         rows, columns = part.shape[:2]
-        whole = np.zeros(canvas.shape, np.uint8)
-        canvas.fill(whole, [slab.outline_m], 255)
-        cover = whole[window].astype(np.float32) / 255.0
-        surface = _concrete(rng, canvas, slab, (rows, columns), whole, window)
+        cover = canvas.inside(slab.outline_m, window).astype(np.float32) / 255.0
+        surface = _concrete(rng, canvas, slab, (rows, columns), window)
         soiled = _soiled(rng, slab, cover)
         cover *= 1.0 - soiled
         colour = cv2.applyColorMap(cv2.convertScaleAbs(np.maximum(surface, 0.0)), palette_of(Soil.CONCRETE))
@@ -34,17 +32,16 @@ def _soiled(rng: np.random.Generator, slab: Slab, cover: Float32Array) -> Float3
     """Return where soil hides the concrete: from its edges inwards, in blotches."""
     shape = (cover.shape[0], cover.shape[1])
     edge = 1.0 - cv2.blur(cover, (61, 61))
-    level = 1.6 * edge + 0.55 * fractal(rng, shape, 5, 512, gain=0.72)
-    return np.asarray(np.clip((level - 1.35 + 1.2 * slab.dirt) * 2.2, 0.0, 0.25 + 0.75 * slab.dirt), np.float32)
+    level = 1.6 * edge + 0.5 * fractal(rng, shape, 4, 512, gain=0.85)
+    return np.asarray(np.clip(level - 0.8 + 1.1 * slab.dirt, 0.0, 0.3 + 0.65 * slab.dirt), np.float32)
 
 
 def _concrete(
-    rng: np.random.Generator, canvas: Canvas, slab: Slab, shape: tuple[int, int], whole: Picture,
-    window: tuple[slice, slice],
+    rng: np.random.Generator, canvas: Canvas, slab: Slab, shape: tuple[int, int], window: tuple[slice, slice]
 ) -> Float32Array:  # fmt: skip
     """Return tones 0..255 of clean concrete with joints, tyre marks and drips."""
     tone = rng.uniform(140.0, 185.0) + 13.0 * fractal(rng, shape, 3, 64, gain=0.7) + 5.0 * fractal(rng, shape, 256, 512)
-    lines = np.zeros_like(whole)
+    lines = np.zeros(canvas.shape, np.uint8)
     corners = np.array(slab.outline_m)
     if slab.joint_m > 0.0:
         side = corners[1] - corners[0]

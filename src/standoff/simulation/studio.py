@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from standoff.core.types import ImageArray
 from standoff.simulation.flight import blur_homography
 from standoff.simulation.moment import Body, Moment, scene_at
-from standoff.simulation.render import Look, Renderer
+from standoff.simulation.render import Renderer
 from standoff.simulation.sensor import Sensor
 from standoff.simulation.site import Site
 from standoff.simulation.truth import IdArray, Row, entity_rows, frame_row, pair_rows
@@ -77,7 +77,8 @@ class Studio:
         scene, site = self._site.scene, self._site
         moment = scene_at(scene, time_s)
         blur = None if clean else blur_homography(scene.flight, time_s, site.shutter_s, 0.0)
-        look = Look(**{**site.look, "exposure": site.look["exposure"] * site.sensor.exposure_at(time_s)}, blur=blur)
+        exposure = site.look.exposure * site.sensor.exposure_at(time_s)
+        look = replace(site.look, exposure=exposure, blur=blur)
         rendered = self._renderer.render(moment.view, moment.batches, scene.light, look)
         image = rendered.image
         if not clean:

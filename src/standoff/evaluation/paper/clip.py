@@ -243,6 +243,8 @@ def _distances(pairs: Columns, entity_id: IntArray, class_id: IntArray, count: i
     person = np.array([CLASSES[k].role is Role.PERSON for k in class_id], dtype=np.bool_)
     which = np.array([(a, b) for a in np.flatnonzero(person) for b in np.flatnonzero(~person)], dtype=np.int64)
     which = which.reshape(-1, 2)
+    if not np.isin([pairs["entity_a"], pairs["entity_b"]], entity_id).all():
+        raise DataError(expected="pairs of entities of truth.parquet", found="others in pairs.parquet", fix=_FIX)
     square = np.full((count, len(entity_id), len(entity_id)), np.nan)
     first, second = (np.searchsorted(entity_id, pairs[name]) for name in ("entity_a", "entity_b"))
     square[pairs["frame"], first, second] = square[pairs["frame"], second, first] = pairs["centre_m"]

@@ -1,8 +1,8 @@
 """The kinematics of a digging arm: joint angles to poses, and a place for the bucket's tip to joint angles.
 
-Angles are elevations in the vertical plane of the boom, upwards positive: boom_deg of the line from boom foot to arm pivot above
-the horizon, arm_deg of the arm against that line (0 stretched, negative folded in), bucket_deg of the line from
-bucket pivot to tooth tip against the arm (negative curled in).
+Angles are elevations in the vertical plane of the boom, upwards positive: boom_deg of the line from boom foot to arm
+pivot above the horizon, arm_deg of the arm against that line (0 stretched, negative folded in), bucket_deg of the line
+from bucket pivot to tooth tip against the arm (negative curled in).
 """
 
 from __future__ import annotations
@@ -16,6 +16,23 @@ import numpy as np
 from standoff.core.homography import FloatArray
 from standoff.simulation.machines.machine_parts import Point, strut_pose
 from standoff.simulation.mesh import rotation, translation
+
+
+def knee_m(start_m: FloatArray, end_m: FloatArray, first_m: float, second_m: float) -> FloatArray:
+    """Return (3,) where two bars in an xz plane meet, on the left of the way from start to end (above, going along x).
+
+    Args:
+        start_m: (3,) pivot of the first bar.
+        end_m: (3,) pivot of the second bar, same y.
+        first_m: Length of the first bar.
+        second_m: Length of the second bar.
+    """
+    span_m = float(np.linalg.norm(end_m - start_m))
+    ahead = (end_m - start_m) / span_m
+    along_m = (span_m**2 + first_m**2 - second_m**2) / (2.0 * span_m)
+    beside_m = np.sqrt(max(first_m**2 - along_m**2, 0.0))
+    knee: FloatArray = start_m + along_m * ahead + beside_m * np.array([-ahead[2], 0.0, ahead[0]])
+    return knee
 
 
 class Link(Enum):
@@ -85,15 +102,11 @@ class DiggingArm:
         }
 
     def _bucket_linkage(self, bucket_to_arm: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return rocker pivot, rod end and ear, (3,) each in the arm's frame: where two circles meet, the outer one."""
+        """Return rocker pivot, rod end and ear, (3,) each in the arm's frame."""
         y_m = self.bucket_y_m
         pivot = np.array([self.rocker_xz_m[0], y_m, self.rocker_xz_m[1]])
         ear = (bucket_to_arm @ [self.ear_xz_m[0], 0.0, self.ear_xz_m[1], 1.0])[:3]
-        span = float(np.linalg.norm(ear - pivot))
-        ahead = (ear - pivot) / span
-        along_m = (span**2 + self.rocker_m**2 - self.tie_m**2) / (2.0 * span)
-        outward = np.array([-ahead[2], 0.0, ahead[0]])
-        joint = pivot + along_m * ahead + np.sqrt(max(self.rocker_m**2 - along_m**2, 0.0)) * outward
+        joint = knee_m(pivot, ear, self.rocker_m, self.tie_m)
         return pivot, joint, ear
 
     def tip_m(self, joints: Mapping[str, float]) -> FloatArray:

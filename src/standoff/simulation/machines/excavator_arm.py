@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+import shapely
 
 from standoff.simulation.machines.digging import DiggingArm, Link
 from standoff.simulation.machines.excavator_body import foot_of
 from standoff.simulation.machines.excavator_sizes import ExcavatorSize
 from standoff.simulation.machines.machine_parts import Point, Ram, beam, lamp, scoop, soil_heap
 from standoff.simulation.machines.paint import BLACK, DARK_GREY
-from standoff.simulation.mesh import Mesh, Surface, box, cylinder, join, profile, rotation, scaling, translation, tube
+from standoff.simulation.mesh import Mesh, Surface, cylinder, join, profile, rotation, translation, tube
 
 Outline = list[tuple[float, float]]
+
+RamPlan = tuple[Link, Point, Link, Point, tuple[float, ...]]
+"""What holds the barrel, where; what the rod moves, where; sideways offsets."""
 
 _BOOM_OUTLINE = (
     (-0.030, 0.000), (-0.022, 0.024), (0.0, 0.036), (0.20, 0.140), (0.33, 0.204), (0.39, 0.222), (0.45, 0.220),
@@ -136,5 +141,81 @@ def _arm(size: ExcavatorSize) -> Mesh:
     return join([profile(outline, width_m, None), *pins, *ears, hose])
 
 
-def _bucket_turn(size: ExcavatorSize) -> tuple[float, np.ndarray]:
-    raise NotImplementedError
+def _bucket_shell(size: ExcavatorSize) -> tuple[Outline, float]:
+    """Return the shell's path and the teeth's length, turned and scaled so that the tip is on x at `bucket_m`."""
+    path = np.array(_SHELL)
+    ahead = (path[0] - path[1]) / np.linalg.norm(path[0] - path[1])
+    tooth_m = 0.0 if size.grading else _TOOTH_M
+    tip = path[0] + tooth_m * ahead
+    length, angle = np.hypot(*tip), np.arctan2(tip[1], tip[0])
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    scale = size.bucket_m / float(length)
+    return [(float(x), float(z)) for x, z in path @ turn * scale], tooth_m * scale
+
+
+def _bucket(size: ExcavatorSize) -> Mesh:
+    path, tooth_m = _bucket_shell(size)
+    k = size.bucket_m / 1.5
+    teeth = 0 if size.grading else max(4, round(size.bucket_width_m / 0.27))
+    shell = scoop(path, size.bucket_width_m, None, teeth=teeth, tooth_m=tooth_m, plate_m=0.045)
+    around = shapely.MultiPoint([(0.0, 0.0), _EAR_XZ]).buffer(0.11).union(shapely.Point(0.45, 0.5).buffer(0.08))
+    ear = [(x * k, z * k) for x, z in around.convex_hull.simplify(0.015).exterior.coords]
+    ears = [profile(ear, 0.05 * k, None, Surface.STEEL).at(0.0, y_m * k, 0.0) for y_m in (-0.17, 0.17)]
+    pins = [
+        cylinder(0.05 * k, 0.62 * k, DARK_GREY, axis="y", sections=8).at(x * k, 0.0, z * k)
+        for x, z in ((0.0, 0.0), _EAR_XZ)
+    ]
+    return join([shell, *ears, *pins])
+
+
+def _soil(size: ExcavatorSize) -> Mesh:
+    path, _ = _bucket_shell(size)
+    (lip_x_m, lip_z_m), (rear_x_m, rear_z_m) = path[0], path[-1]
+    length_m = float(np.hypot(lip_x_m - rear_x_m, lip_z_m - rear_z_m))
+    heap = soil_heap(0.98 * length_m, 0.96 * size.bucket_width_m, 0.3 * length_m, None, seed=round(100 * size.boom_m))
+    tilt = rotation("y", -float(np.rad2deg(np.arctan2(lip_z_m - rear_z_m, lip_x_m - rear_x_m))))
+    middle = translation((lip_x_m + rear_x_m) / 2, 0.0, (lip_z_m + rear_z_m) / 2)
+    return heap.moved(middle @ tilt @ rotation("x", 180.0))
+
+
+@lru_cache(maxsize=32)
+def ram_mounts(size: ExcavatorSize, limits: tuple[tuple[str, tuple[float, float]], ...]) -> tuple[RamMount, ...]:
+    """Build boom, arm and bucket cylinders, each as long as the joints' limits ask for."""
+    linkage = linkage_of(size)
+    boom_depth_m, arm_depth_m = min(size.boom_m, 6.4), min(size.arm_m, 3.2)
+    x_m, y_m, _ = linkage.foot_m
+    beside_m = size.boom_width_m / 2 + 0.1
+    stout_m = 0.05 + 0.008 * boom_depth_m
+    plans = (
+        (Link.UPPER, (x_m + 0.62, y_m, size.deck_m + 0.16), Link.BOOM, (0.40 * size.boom_m, 0.0, 0.16 * boom_depth_m),
+         (-beside_m, beside_m)),
+        (Link.BOOM, (0.425 * size.boom_m, 0.0, 0.255 * boom_depth_m), Link.ARM,
+         (-0.265 * arm_depth_m, 0.0, 0.045 * arm_depth_m), (0.0,)),
+        (Link.ARM, (0.07 * arm_depth_m, 0.0, 0.205 * arm_depth_m), Link.TIE, (0.0, 0.0, 0.0), (0.0,)),
+    )  # fmt: skip
+    return mount_rams(linkage, plans, dict(limits), stout_m)
+
+
+def mount_rams(
+    linkage: DiggingArm, plans: Sequence[RamPlan], limits: Mapping[str, tuple[float, float]], radius_m: float
+) -> tuple[RamMount, ...]:
+    """Build a hydraulic cylinder for each plan, as long as the joints' limits ask for."""
+    mounts = []
+    for barrel_link, barrel_m, rod_link, rod_m, sides_m in plans:
+        shortest_m, longest_m = span_range(linkage, limits, (barrel_link, barrel_m), (rod_link, rod_m))
+        ram = Ram.spanning(shortest_m, longest_m, radius_m)
+        mounts.append(RamMount(ram, barrel_link, barrel_m, rod_link, rod_m, sides_m))
+    return tuple(mounts)
+
+
+def span_range(
+    linkage: DiggingArm, limits: Mapping[str, tuple[float, float]], barrel: tuple[Link, Point], rod: tuple[Link, Point]
+) -> tuple[float, float]:
+    """Return the shortest and longest distance of two pivots within the joints' limits."""
+    spans_m = []
+    for share in np.linspace(0.0, 1.0, 25):
+        joints = {name: low + float(share) * (high - low) for name, (low, high) in limits.items()}
+        frames = linkage.frames(joints)
+        ends = [(frames[link] @ [*point_m, 1.0])[:3] for link, point_m in (barrel, rod)]
+        spans_m.append(float(np.linalg.norm(ends[1] - ends[0])))
+    return min(spans_m), max(spans_m)

@@ -147,8 +147,7 @@ def _right_side(size: ExcavatorSize) -> list[Mesh]:
     cap = cylinder(0.09, 0.08, BLACK, Surface.PLASTIC, sections=10).at(back_m + 0.25, -half_m + 0.22, hood_m - 0.03)
     wing = mirror(0.14, left=False).at(front_m - 0.2, -half_m + 0.05, box_m + 0.55)
     light = lamp(0.14).at(front_m - 0.1, -half_m + 0.3, floor_m + 0.2)
-    stairs = ladder((front_m - 0.32, -half_m - 0.02, size.deck_m - 0.25), 0.5, 0.4, BLACK, steps=2)
-    return [tank, tools, grip, tread, rail, cap, wing, light, stairs]
+    return [tank, tools, grip, tread, rail, cap, wing, light]
 
 
 def _boom_bracket(size: ExcavatorSize) -> list[Mesh]:
@@ -156,7 +155,9 @@ def _boom_bracket(size: ExcavatorSize) -> list[Mesh]:
     low_m = size.deck_m + 0.15
     outline = [(x_m - 0.5, low_m), (x_m + 0.75, low_m), (x_m + 0.6, low_m + 0.2), (x_m + 0.18, z_m + 0.12)]
     outline += [(x_m, z_m + 0.19), (x_m - 0.18, z_m + 0.1)]
-    plates = [profile(outline, 0.07, None).at(0.0, y_m + side * (size.boom_width_m / 2 + 0.05), 0.0) for side in (-1, 1)]
+    plates = [
+        profile(outline, 0.07, None).at(0.0, y_m + side * (size.boom_width_m / 2 + 0.05), 0.0) for side in (-1, 1)
+    ]
     return [*plates, cylinder(0.09, size.boom_width_m + 0.22, None, axis="y", sections=10).at(x_m, y_m, z_m)]
 
 
@@ -176,13 +177,13 @@ def _counterweight(size: ExcavatorSize) -> Mesh:
     chamfer_m = 0.2 if size.rounded else 0.07
     body = moulded(outline, bottom_m + 0.12, top_m, chamfer_m, None)
     belly = moulded([(0.96 * x_m, 0.95 * y_m) for x_m, y_m in outline], bottom_m, bottom_m + 0.2, 0.02, None)
-    eyes = [box((0.16, 0.05, 0.12), None).at(-0.82 * tail_m, y_m, top_m - 0.03) for y_m in (-0.5 * half_m, 0.5 * half_m)]
-    lights = [
-        box((0.04, 0.22, 0.1), RED_LAMP, Surface.GLASS).at(float(np.interp(0.7, (0.4, 0.8), (-1.0, -0.95))) * tail_m,
-                                                           y_m, bottom_m + 0.3)
-        for y_m in (-0.7 * half_m, 0.7 * half_m)
-    ]  # fmt: skip
-    return join([body, shaded(belly, 0.6), *eyes, *(lights if not size.rounded else [])])
+    extras = [
+        box((0.16, 0.05, 0.12), None).at(-0.82 * tail_m, side * 0.5 * half_m, top_m - 0.03) for side in (-1, 1)
+    ]
+    if not size.rounded:
+        red = box((0.04, 0.22, 0.1), RED_LAMP, Surface.GLASS)
+        extras += [red.at(-0.965 * tail_m, side * 0.7 * half_m, bottom_m + 0.3) for side in (-1, 1)]
+    return join([body, shaded(belly, 0.6), *extras])
 
 
 def crawler_of(size: ExcavatorSize) -> Crawler:
@@ -200,7 +201,7 @@ def crawler_meshes(size: ExcavatorSize) -> tuple[Mesh, Mesh]:
 @lru_cache(maxsize=32)
 def wheel_mesh(size: ExcavatorSize) -> Mesh:
     """Build a pair of tyres of a wheeled excavator."""
-    single = wheel(size.gear_m / 2, 0.46 * size.shoe_m, None, lugs=12, sections=20)
+    single = wheel(size.gear_m / 2, 0.46 * size.shoe_m, None, sections=16)
     return join([single.at(0.0, side * 0.26 * size.shoe_m, 0.0) for side in (-1.0, 1.0)])
 
 
@@ -258,5 +259,3 @@ def wheel_places(size: ExcavatorSize) -> list[tuple[float, float, float]]:
     """Return the centres of the four pairs of tyres."""
     x_m, y_m = (size.base_m - size.gear_m) / 2, (size.width_m - size.shoe_m) / 2
     return [(sx * x_m, sy * y_m, size.gear_m / 2) for sx in (-1, 1) for sy in (-1, 1)]
-
-

@@ -1,4 +1,4 @@
-"""The excavators that sites have: a compact one of 8 t up to 40 t, short and long tails, a long reach, two on wheels."""
+"""The excavators that sites have: 8 t to 40 t, short and long tails, a long reach, two on wheels."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ from standoff.simulation.bars import bars
 from standoff.simulation.machines.machine_parts import beacon, cab, hull, mirror
 from standoff.simulation.machines.paint import BLACK, DARK_GREY, GLASS, LAMP, RED_LAMP, STEEL, Painted, weather
 from standoff.simulation.machines.road_wheels import RoadWheels, axle_places, road_wheel
-from standoff.simulation.mesh import Colour, Mesh, Surface, box, cylinder, join, profile, srgb
+from standoff.simulation.mesh import Mesh, Surface, box, cylinder, join, profile, srgb
 from standoff.simulation.scene import Batch
 
 WIDTH_M = 2.5
@@ -21,10 +21,20 @@ _CAB_LENGTH_M = 2.1
 _CAB_PAINTS = tuple(
     srgb(code)
     for code in (
-        "#d9d9d5", "#dcdcd8", "#c9cbc9", "#a5231c", "#b8401c", "#1f4f96", "#d8a020", "#e07018", "#2f6a48", "#8f9397",
-        "#6fa0b8", "#26303a",
+        "#d9d9d5",
+        "#dcdcd8",
+        "#c9cbc9",
+        "#a5231c",
+        "#b8401c",
+        "#1f4f96",
+        "#d8a020",
+        "#e07018",
+        "#2f6a48",
+        "#8f9397",
+        "#6fa0b8",
+        "#26303a",
     )
-)  # fmt: skip
+)
 _WHEEL_PAINTS = (srgb("#8f9090"), srgb("#5b5c5d"), srgb("#c9cac8"), srgb("#8a2a20"))
 
 
@@ -64,12 +74,14 @@ class Lorry:
 
     Attributes:
         plan: Its lengths.
+        height_m: Of the cab, beacons and deflector included.
         cab: Painted cab.
         chassis: Frame, tanks, mudguards.
         wheels: Front and rear ones.
     """
 
     plan: LorryPlan
+    height_m: float
     cab: Painted
     chassis: Painted
     wheels: tuple[RoadWheels, ...]
@@ -90,32 +102,40 @@ def make_lorry(rng: np.random.Generator, plan: LorryPlan) -> Lorry:
     front_x = tuple(plan.front_m - x for x in plan.front_axles_m)
     rear_x = tuple(plan.front_m - x for x in plan.rear_axles_m)
     share = np.repeat([1.0, 0.7][: len(front_x)], 2)
+    cab_mesh = _cab(int(rng.integers(4)), plan)
     return Lorry(
         plan,
-        Painted(_cab(int(rng.integers(4)), plan), paint, 0.6 * dust),
+        float(cab_mesh.vertices_m[:, 2].max()),
+        Painted(cab_mesh, paint, 0.6 * dust),
         Painted(_chassis(plan), frame, dust),
         (
             RoadWheels(Painted(single, rims, dust), WHEEL_RADIUS_M, axle_places(front_x, 2.1, WHEEL_RADIUS_M), share),
             RoadWheels(
-                Painted(twin, rims, dust), WHEEL_RADIUS_M, axle_places(rear_x, 1.88, WHEEL_RADIUS_M),
+                Painted(twin, rims, dust),
+                WHEEL_RADIUS_M,
+                axle_places(rear_x, 1.88, WHEEL_RADIUS_M),
                 np.zeros(2 * len(rear_x)),
             ),
         ),
-    )  # fmt: skip
+    )
 
 
 @lru_cache(maxsize=16)
 def _cab(variant: int, plan: LorryPlan) -> Mesh:
-    height_m = (2.05, 2.05, 2.3, 2.45)[variant]
-    middle_m, low_m = plan.front_m - _CAB_LENGTH_M / 2 - 0.05, 0.85
+    height_m = (1.95, 1.95, 2.2, 2.35)[variant]
+    middle_m, low_m = plan.front_m - _CAB_LENGTH_M / 2 - 0.05, 0.95
     length_m, width_m = _CAB_LENGTH_M - 0.1, WIDTH_M - 0.08
     front_m = middle_m + length_m / 2
     parts = [
         cab(length_m, width_m, height_m, slant_m=0.28, sill=0.46).at(middle_m, 0.0, low_m),
-        box((length_m - 0.1, width_m - 0.04, 0.4), None).at(middle_m, 0.0, 0.5),
+        box((0.55, width_m - 0.04, 0.45), None).at(front_m - 0.27, 0.0, 0.52),
+        box((0.2, width_m - 0.3, 0.45), BLACK, Surface.PLASTIC).at(front_m - length_m + 0.1, 0.0, 0.55),
+        box((1.3, 1.5, 0.4), BLACK, Surface.STEEL).at(middle_m, 0.0, 0.6),
         box((0.35, WIDTH_M, 0.42), (0.5, 0.5, 0.5) if variant % 2 else None).at(front_m, 0.0, 0.35),
         box((0.06, 1.5, 0.55), BLACK, Surface.PLASTIC).at(front_m, 0.0, 0.95),
-        box((0.7, width_m - 0.02, 1.1), None).at(middle_m - length_m / 2 + 0.35, 0.0, low_m + 0.85),
+        box((0.6, width_m - 0.01, 0.53 * height_m - 0.1), None).at(
+            middle_m - length_m / 2 + 0.3, 0.0, low_m + 0.46 * height_m
+        ),
         *_lights(front_m),
         *_mirrors(front_m - 0.25, low_m + 0.72 * height_m),
     ]
@@ -138,9 +158,7 @@ def _lights(front_m: float) -> list[Mesh]:
 
 
 def _mirrors(x_m: float, z_m: float) -> list[Mesh]:
-    return [
-        mirror(0.32, left=side > 0).at(x_m, side * (WIDTH_M / 2 - 0.06), z_m) for side in (-1.0, 1.0)
-    ]  # fmt: skip
+    return [mirror(0.32, left=side > 0).at(x_m, side * (WIDTH_M / 2 - 0.06), z_m) for side in (-1.0, 1.0)]
 
 
 @lru_cache(maxsize=4)
@@ -154,14 +172,15 @@ def _chassis(plan: LorryPlan) -> Mesh:
     guards = [guard.at(plan.front_m - x, side * 0.95, 1.0) for x in plan.rear_axles_m for side in (-1, 1)]
     beams = [cylinder(0.09, 1.9, DARK_GREY, axis="y", sections=8).at(x, 0.0, WHEEL_RADIUS_M) for x in axles]
     rear = [box((0.06, 0.35, 0.12), RED_LAMP, Surface.PLASTIC).at(rear_m, side * 0.95, 0.75) for side in (-1, 1)]
-    return join([
-        bars(np.array(rails), 0.1, None, Surface.PAINT, depth_m=0.26), bars(np.array(cross), 0.12, None),
-        box((0.9, 0.55, 0.55), STEEL, Surface.STEEL).at(tank_m, 0.85, 0.45),
-        cylinder(0.28, 1.0, STEEL, axis="x", sections=10).at(tank_m, -0.85, 0.72),
-        box((0.08, 2.3, 0.15), None).at(rear_m, 0.0, 0.55), *guards, *beams, *rear,
-    ])  # fmt: skip
-
-
-def chassis_colour(rng: np.random.Generator, colours: tuple[Colour, ...]) -> Colour:
-    """Draw a weathered body colour from a palette."""
-    return weather(rng, colours[int(rng.integers(len(colours)))])
+    return join(
+        [
+            bars(np.array(rails), 0.1, None, Surface.PAINT, depth_m=0.26),
+            bars(np.array(cross), 0.12, None),
+            box((0.9, 0.55, 0.55), STEEL, Surface.STEEL).at(tank_m, 0.85, 0.45),
+            cylinder(0.28, 1.0, STEEL, axis="x", sections=10).at(tank_m, -0.85, 0.72),
+            box((0.08, 2.3, 0.15), None).at(rear_m, 0.0, 0.55),
+            *guards,
+            *beams,
+            *rear,
+        ]
+    )

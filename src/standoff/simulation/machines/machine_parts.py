@@ -24,10 +24,10 @@ from standoff.simulation.mesh import (
     lathe,
     profile,
     rotation,
-    scaling,
     translation,
     tube,
 )
+from standoff.simulation.scene import Batch
 
 Point = tuple[float, float, float]
 
@@ -107,8 +107,8 @@ def wheel(
 def _lugs(radius_m: float, width_m: float, count: int) -> list[Mesh]:
     if not count:
         return []
-    depth_m, length_m = 0.09 * radius_m, 0.52 * width_m
-    bar = box((2.2 * radius_m / count, length_m, depth_m), RUBBER, Surface.RUBBER)
+    depth_m, length_m = 0.07 * radius_m, 0.54 * width_m
+    bar = box((2.6 * radius_m / count, length_m, depth_m), RUBBER, Surface.RUBBER)
     placed = []
     for side in (-1.0, 1.0):
         slanted = rotation("z", -side * 22.0)
@@ -367,7 +367,17 @@ def soil_heap(length_m: float, width_m: float, height_m: float, colour: Colour |
     return Mesh.of(trimesh.Trimesh(points, faces, process=False), colour, Surface.SOIL, crease_deg=50.0)
 
 
-def scaled_poses(scale: float, poses: FloatArray) -> FloatArray:
-    """Return poses (..., 4, 4) of a machine that is `scale` times as large as it was modelled."""
-    larger: FloatArray = scaling(scale, scale, scale) @ poses
-    return larger
+def rectangle(length_m: float, width_m: float) -> FloatArray:
+    """Return the (4, 2) corners of a rectangle about the origin, counter-clockwise.
+
+    >>> rectangle(4.0, 2.0).tolist()
+    [[-2.0, -1.0], [2.0, -1.0], [2.0, 1.0], [-2.0, 1.0]]
+    """
+    return np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]) * [length_m / 2, width_m / 2]
+
+
+def highest_m(batches: Sequence[Batch]) -> float:
+    """Return z of the highest vertex of all batches."""
+    return max(
+        float((batch.mesh.vertices_m @ pose[2, :3] + pose[2, 3]).max()) for batch in batches for pose in batch.poses
+    )

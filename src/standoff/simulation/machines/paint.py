@@ -20,6 +20,9 @@ LAMP = srgb("#e6e4d8")
 AMBER = srgb("#e07a10")
 RED_LAMP = srgb("#8f1712")
 
+SOILS = ("#6f5a41", "#8a7350", "#5a4a38", "#7d6a55", "#94764a")
+"""What buckets and beds are loaded with."""
+
 _PAINTS = (
     ("#e0a010", 0.27),
     ("#e8b820", 0.15),
@@ -81,8 +84,8 @@ def weather(rng: np.random.Generator, colour: Colour, strength: float = 1.0) -> 
     clean = np.array(colour)
     grey = clean @ [0.3, 0.6, 0.1]
     chalk = np.array([0.42, 0.38, 0.31])
-    faded = clean + strength * rng.uniform(0.0, 0.25) * (grey - clean)
-    faded = faded + strength * rng.uniform(0.0, 0.18) * (chalk - faded)
+    faded = clean + strength * rng.uniform(0.0, 0.12) * (grey - clean)
+    faded = faded + strength * rng.uniform(0.0, 0.14) * (chalk - faded)
     varied = faded * (1.0 + strength * (rng.uniform(-0.15, 0.10) + rng.uniform(-0.04, 0.04, 3)))
     red, green, blue = np.clip(varied, 0.012, 0.8)
     return float(red), float(green), float(blue)

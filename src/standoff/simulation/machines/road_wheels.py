@@ -53,13 +53,3 @@ def axle_places(axles_x_m: tuple[float, ...], track_m: float, radius_m: float) -
 def road_wheel(radius_m: float, width_m: float, lugs: int = 0) -> Mesh:
     """Return a wheel with a rim in the tint's colour; fewer triangles than a wheel loader's."""
     return wheel(radius_m, width_m, None, lugs=lugs, sections=14, rim=0.55 if lugs else 0.62)
-
-
-def rectangle(length_m: float, width_m: float) -> FloatArray:
-    """Return the (4, 2) footprint of a length and a width, counter-clockwise.
-
-    >>> rectangle(4.0, 2.0).tolist()
-    [[-2.0, -1.0], [2.0, -1.0], [2.0, 1.0], [-2.0, 1.0]]
-    """
-    half = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]) / 2
-    return half * [length_m, width_m]

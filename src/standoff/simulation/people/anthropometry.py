@@ -24,8 +24,6 @@ HIP_JOINT_Y = 0.050
 SHOULDER_JOINT_Y = 0.100
 REFERENCE_STATURE_M = 1.75
 """All body meshes are modelled at this stature and scaled by the pose."""
-SOLE_M = 0.022
-"""Thickness of a boot's sole, at `REFERENCE_STATURE_M`."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,9 +1,8 @@
 """How feet and arms move in a walk.
 
 The foot is a convex sole that rolls over the ground from heel to toe, so a standing foot does not slide: its place
-follows from the distance walked, never from a clock. Events of the cycle (foot flat 8 %, heel off 40 %, toe off 62 %)
-and pitches of the foot are of Perry, "Gait Analysis" (1992), and Winter, "Biomechanics and Motor Control of Human
-Movement".
+follows from the distance walked, never from a clock. Toe off at 62 % of the cycle is Perry's, "Gait Analysis" (1992);
+the pitches of the foot in between are set by eye.
 """
 
 from __future__ import annotations
@@ -54,11 +53,12 @@ def amplitude(speed_mps: float) -> float:
 
 
 class Footing(NamedTuple):
-    """Where an ankle is: ahead of the hips, above the ground, and how far the toes point up."""
+    """Where an ankle is: ahead of the hips, above the ground, how far the toes point up, how far the sole rolled."""
 
     x_m: float
     z_m: float
     pitch_deg: float
+    rolled_m: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -100,12 +100,12 @@ def footing(phase: float, step_m: float, share: float, sole: Sole) -> Footing:
     pitch_deg = float(_PITCH(phase)) * share
     rolled_m, height_m = sole.resting(pitch_deg)
     if phase < TOE_OFF:
-        return Footing(planted_m + rolled_m - stride_m * phase, height_m, pitch_deg)
+        return Footing(planted_m + rolled_m - stride_m * phase, height_m, pitch_deg, rolled_m)
     swing = (phase - TOE_OFF) / (1.0 - TOE_OFF)
     behind_m, ahead_m = planted_m + lift_m - stride_m * TOE_OFF, planted_m + touch_m
-    retraction_m = 0.3 * stride_m * (1.0 - TOE_OFF)
+    retraction_m = stride_m * (1.0 - TOE_OFF)
     x_m = behind_m + (ahead_m - behind_m) * ease(swing) + retraction_m * swing * swing * (1.0 - swing)
-    return Footing(x_m, height_m + _CLEARANCE_M * share * np.sin(np.pi * swing) ** 2, pitch_deg)
+    return Footing(x_m, height_m + _CLEARANCE_M * share * np.sin(np.pi * swing), pitch_deg, rolled_m)
 
 
 def arm_swing_deg(phase: float, speed_mps: float) -> tuple[float, float]:
@@ -116,5 +116,5 @@ def arm_swing_deg(phase: float, speed_mps: float) -> tuple[float, float]:
     """
     half_range_deg = 15.0 * speed_mps**0.7 * amplitude(speed_mps)
     swing_deg = -half_range_deg * np.cos(2.0 * np.pi * phase)
-    elbow_deg = 14.0 + 0.5 * half_range_deg + 0.6 * swing_deg
-    return float(swing_deg + 0.15 * half_range_deg), float(elbow_deg)
+    elbow_deg = 12.0 + 0.5 * half_range_deg + 0.6 * swing_deg
+    return float(swing_deg - 0.2 * half_range_deg), float(elbow_deg)

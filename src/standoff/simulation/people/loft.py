@@ -20,11 +20,12 @@ def even_columns(count: int) -> FloatArray:
     >>> even_columns(4).tolist()
     [0.0, 90.0, 180.0, 270.0]
     """
-    angles_deg: FloatArray = np.arange(count) * (360.0 / count)
-    return angles_deg
+    return np.linspace(0.0, 360.0, count, endpoint=False)
 
 
-def loft(rings: Sequence[Ring], columns_deg: FloatArray, *, squareness: float = 2.0) -> trimesh.Trimesh:
+def loft(
+    rings: Sequence[Ring], columns_deg: FloatArray, *, squareness: float = 2.0, folds: float = 0.0
+) -> trimesh.Trimesh:
     """Return the closed skin over sections from the lowest to the highest.
 
     The first 2 * (rings - 1) * columns faces are the sides: ring by ring, column by column, two each; the ends follow.
@@ -33,14 +34,17 @@ def loft(rings: Sequence[Ring], columns_deg: FloatArray, *, squareness: float = 
         rings: From the bottom up.
         columns_deg: (C,) rising angles of the vertices of a section, counter-clockwise from x.
         squareness: Exponent of the superellipse: 2 is an ellipse, 4 nearly a box.
+        folds: How far the skin bulges in and out, as a share of the radius; cloth is never smooth.
     """
     sections = np.asarray(rings, dtype=np.float64)
     angle = np.deg2rad(columns_deg)
     around = np.column_stack([np.cos(angle), np.sin(angle)])
     around /= (np.abs(around) ** squareness).sum(axis=1, keepdims=True) ** (1.0 / squareness)
+    height_m = sections[:, :1]
+    bulge = 1.0 + folds * (np.sin(3.0 * angle + 41.0 * height_m) + 0.7 * np.sin(5.0 * angle - 67.0 * height_m + 1.0))
     outline = np.empty((len(sections), len(angle), 3))
-    outline[..., 0] = sections[:, None, 1] + sections[:, None, 2] * around[:, 0]
-    outline[..., 1] = sections[:, None, 3] * around[:, 1]
+    outline[..., 0] = sections[:, 1:2] + sections[:, 2:3] * around[:, 0] * bulge
+    outline[..., 1] = sections[:, 3:4] * around[:, 1] * bulge
     outline[..., 2] = sections[:, None, 0]
     ends = np.array([[sections[i, 1], 0.0, sections[i, 0]] for i in (0, -1)])
     vertices = np.concatenate([outline.reshape(-1, 3), ends])

@@ -16,7 +16,7 @@ from standoff.simulation.people.gait import Footing, Sole, amplitude, arm_swing_
 SIDES = (1.0, -1.0)
 """Sign of y of the left and the right side; pairs are always in this order."""
 _ELBOW_TOWARDS = np.array([-0.6, 0.35, -0.5])
-_LOWEST_WRIST_M = 0.12
+_LOWEST_WRIST_M = 0.18
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +34,7 @@ class Stance:
         feet_apart_m: Half the distance between the ankles.
         ahead_m: How far the left foot is ahead of the right when standing.
         kneeling: Whether crouching ends on the right knee.
+        look_deg: How far the head is turned to the left.
     """
 
     phase: float
@@ -46,6 +47,7 @@ class Stance:
     feet_apart_m: float = 0.09
     ahead_m: float = 0.0
     kneeling: bool = False
+    look_deg: float = 0.0
 
     @property
     def walk(self) -> float:
@@ -74,29 +76,23 @@ def stand(body: Body, stance: Stance, sole: Sole) -> Trunk:
     """Put pelvis, legs, chest and head where a stance has them; the lowest sole rests on z = 0."""
     ankles_m, boots = _feet(body, stance, sole)
     crouch = max(stance.crouch, 0.10 * np.sin(np.deg2rad(stance.bend_deg)))
-    hips_x_m = body.stature_m * (-0.09 * np.sin(np.deg2rad(stance.bend_deg)) - (0.02 if stance.kneeling else 0.07) * crouch)
-    pelvis_yaw_deg = -5.0 * stance.walk * np.cos(2.0 * np.pi * stance.phase) + 0.25 * stance.turn_deg
-    spread = np.array([[0.0, side * ratio.HIP_JOINT_Y * body.stature_m, 0.0] for side in SIDES])
-    hips_m = spread @ rotation("z", pelvis_yaw_deg)[:3, :3].T + [hips_x_m, 0.0, 0.0]
-    standing_m = _hip_height_m(body, ankles_m, hips_m, 0.995 - 0.02 * stance.walk)
-    squatting_m = body.stature_m * (0.285 if stance.kneeling else 0.23)
-    hips_m[:, 2] = standing_m + ease(crouch) * (min(squatting_m, standing_m) - standing_m)
+    pelvis_yaw_deg = 0.25 * stance.turn_deg - 5.0 * stance.walk * np.cos(2.0 * np.pi * stance.phase)
+    hips_m = _hips(body, stance, ankles_m, crouch, pelvis_yaw_deg)
     thighs, shins = _legs(body, hips_m, ankles_m, crouch)
 
-    lean_deg = min(stance.bend_deg + 25.0 * crouch + 3.0 * stance.walk, max(stance.bend_deg, 95.0))
-    size = scaling(body.scale * body.girth, body.scale * body.girth, body.scale * body.trunk_share)
-    middle_m = hips_m.mean(axis=0)
-    pelvis = translation(*middle_m) @ rotation("z", pelvis_yaw_deg) @ rotation("y", 0.6 * lean_deg)
-    waist_m = (ratio.WAIST_HEIGHT - ratio.HIP_HEIGHT) * body.stature_m * body.trunk_share
-    chest = pelvis @ translation(0.0, 0.0, waist_m) @ rotation("y", 0.4 * lean_deg)
-    chest_yaw_deg = 0.75 * stance.turn_deg - 1.8 * (pelvis_yaw_deg - 0.25 * stance.turn_deg)
-    chest = chest @ rotation("z", chest_yaw_deg)
     trunk_m = body.stature_m * body.trunk_share
+    lean_deg = min(stance.bend_deg + 25.0 * crouch + 3.0 * stance.walk, max(stance.bend_deg, 95.0))
+    pelvis = translation(*hips_m.mean(axis=0)) @ rotation("z", pelvis_yaw_deg) @ rotation("y", 0.6 * lean_deg)
+    chest_yaw_deg = 1.2 * stance.turn_deg - 1.8 * pelvis_yaw_deg
+    chest = pelvis @ translation(0.0, 0.0, (ratio.WAIST_HEIGHT - ratio.HIP_HEIGHT) * trunk_m)
+    chest = chest @ rotation("y", 0.4 * lean_deg) @ rotation("z", chest_yaw_deg)
+    head = chest @ translation(0.01, 0.0, (ratio.HEAD_PIVOT_HEIGHT - ratio.WAIST_HEIGHT) * trunk_m)
+    head = head @ rotation("y", 8.0 - 0.35 * lean_deg) @ rotation("z", 0.2 * stance.turn_deg + stance.look_deg)
+
     shoulder_z_m = (ratio.SHOULDER_HEIGHT - ratio.WAIST_HEIGHT) * trunk_m
     half_breadth_m = ratio.SHOULDER_JOINT_Y * body.stature_m * (0.5 + 0.5 * body.girth)
     shoulders_m = np.array([(chest @ [0.0, side * half_breadth_m, shoulder_z_m, 1.0])[:3] for side in SIDES])
-    head = chest @ translation(0.01, 0.0, (ratio.HEAD_PIVOT_HEIGHT - ratio.WAIST_HEIGHT) * trunk_m)
-    head = head @ rotation("y", 8.0 - 0.35 * lean_deg) @ rotation("z", 0.2 * stance.turn_deg)
+    size = scaling(body.scale * body.girth, body.scale * body.girth, body.scale * body.trunk_share)
     frames = {
         "pelvis": pelvis @ size,
         "chest": chest @ size,
@@ -106,6 +102,17 @@ def stand(body: Body, stance: Stance, sole: Sole) -> Trunk:
         "boot": boots,
     }
     return Trunk(frames, chest, rotation("z", pelvis_yaw_deg + chest_yaw_deg)[:3, :3], shoulders_m)
+
+
+def _hips(body: Body, stance: Stance, ankles_m: FloatArray, crouch: float, yaw_deg: float) -> FloatArray:
+    """Return the hip joints (2, 3): as high as the legs reach, lower and further back in a crouch or a bend."""
+    back = 0.09 * np.sin(np.deg2rad(stance.bend_deg)) + (0.02 if stance.kneeling else 0.07) * crouch
+    spread_m = np.array([[0.0, side * ratio.HIP_JOINT_Y * body.stature_m, 0.0] for side in SIDES])
+    hips_m: FloatArray = spread_m @ rotation("z", yaw_deg)[:3, :3].T - [back * body.stature_m, 0.0, 0.0]
+    standing_m = _hip_height_m(body, ankles_m, hips_m, 0.995 - 0.02 * stance.walk)
+    crouched_m = min(body.stature_m * (0.285 if stance.kneeling else 0.23), standing_m)
+    hips_m[:, 2] = standing_m + ease(crouch) * (crouched_m - standing_m)
+    return hips_m
 
 
 def _feet(body: Body, stance: Stance, sole: Sole) -> tuple[FloatArray, FloatArray]:
@@ -118,11 +125,13 @@ def _feet(body: Body, stance: Stance, sole: Sole) -> tuple[FloatArray, FloatArra
         if knelt:
             pitch_deg = foot.pitch_deg - (70.0 * knelt if side < 0 else 0.0)
             x_m = foot.x_m + (0.12 if side > 0 else -0.24) * body.stature_m * knelt
-            foot = Footing(x_m, sole.resting(pitch_deg)[1], pitch_deg)
-        x_m = foot.x_m + side * stance.ahead_m * still / 2
-        y_m = side * (stance.feet_apart_m + 0.05 * ease(stance.crouch) * (not stance.kneeling))
-        ankles_m[i] = x_m, y_m, foot.z_m
-        turn = rotation("z", side * stance.toes_out_deg * (1.0 + 2.0 * stance.crouch * (not stance.kneeling)))
+            rolled_m, height_m = sole.resting(pitch_deg)
+            foot = Footing(x_m, height_m, pitch_deg, rolled_m)
+        outwards = 0.0 if stance.kneeling else ease(stance.crouch)
+        turn = rotation("z", side * stance.toes_out_deg * (1.0 + 2.0 * outwards))
+        # The sole rolls along the foot, which does not point straight ahead.
+        ankles_m[i] = foot.rolled_m * (turn[:3, 0] - [1.0, 0.0, 0.0])
+        ankles_m[i] += foot.x_m + side * stance.ahead_m * still / 2, side * (stance.feet_apart_m + 0.05 * outwards), foot.z_m
         boots[i] = translation(*ankles_m[i]) @ turn @ rotation("y", -foot.pitch_deg) @ scaling(*(body.scale,) * 3)
     return ankles_m, boots
 

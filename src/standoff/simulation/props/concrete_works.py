@@ -69,7 +69,9 @@ def footing(rng: np.random.Generator) -> Mesh:
     top = height
     if rng.uniform() < 0.6:
         top = height + rng.uniform(0.1, 0.9)
-        parts.append(toned(block((stub + 0.1, stub + 0.1, top - height), colour, Surface.CONCRETE).at(0, 0, height), 0.9))
+        parts.append(
+            toned(block((stub + 0.1, stub + 0.1, top - height), colour, Surface.CONCRETE).at(0, 0, height), 0.9)
+        )
     parts += starters(rng, (stub, stub), top, rng.uniform(0.5, 1.3), 0.16)
     return join(parts)
 
@@ -194,7 +196,10 @@ def _mats(rng: np.random.Generator) -> tuple[Batch, ...]:
     poses[:, 0, 0] = poses[:, 1, 1] = np.cos(turn)
     poses[:, 1, 0], poses[:, 0, 1] = np.sin(turn), -np.sin(turn)
     feet = np.stack([translation(x, 0.0, 0.0) for x in (-0.9, 0.9)])
-    return (place(_mat(int(rng.integers(4))), poses, dust=0.3), place(_timber_bearer(0), feet, tint=tints(rng, WOODS, 2)))
+    return (
+        place(_mat(int(rng.integers(4))), poses, dust=0.3),
+        place(_timber_bearer(0), feet, tint=tints(rng, WOODS, 2)),
+    )
 
 
 @varied

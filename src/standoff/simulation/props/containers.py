@@ -18,11 +18,38 @@ _WIDTH_M, _HEIGHT_M = 2.44, 2.59
 _PAINTS = tuple(
     srgb(code)
     for code in (
-        "#7a2f22", "#8a3b1f", "#1f4e79", "#2a6496", "#2e6b4f", "#3f5f3a", "#5b6166", "#8c8f90", "#d8d6cf", "#e2e0d8",
-        "#c8631c", "#b59a3c", "#233a5c", "#9b2d2b", "#6f8796",
+        "#7a2f22",
+        "#8a3b1f",
+        "#1f4e79",
+        "#2a6496",
+        "#2e6b4f",
+        "#3f5f3a",
+        "#5b6166",
+        "#8c8f90",
+        "#d8d6cf",
+        "#e2e0d8",
+        "#c8631c",
+        "#b59a3c",
+        "#233a5c",
+        "#9b2d2b",
+        "#6f8796",
     )
-)  # fmt: skip
-_RUBBLE = tuple(srgb(code) for code in ("#8f8a80", "#a39b8c", "#7d5b48", "#9a8f7c", "#c9c4b8", "#6d6256", "#a58a63", "#d0ccc0", "#35506f", "#b58c54"))
+)
+_RUBBLE = tuple(
+    srgb(code)
+    for code in (
+        "#8f8a80",
+        "#a39b8c",
+        "#7d5b48",
+        "#9a8f7c",
+        "#c9c4b8",
+        "#6d6256",
+        "#a58a63",
+        "#d0ccc0",
+        "#35506f",
+        "#b58c54",
+    )
+)
 
 
 def make_container(rng: np.random.Generator) -> tuple[Batch, ...]:
@@ -31,7 +58,9 @@ def make_container(rng: np.random.Generator) -> tuple[Batch, ...]:
     variant = int(rng.integers(_VARIANTS))
     batches = []
     for level in range(count):
-        pose = translation(*rng.normal(0.0, 0.04, 2), level * _HEIGHT_M) @ rotation("z", 180.0 * rng.integers(2))
+        pose = translation(rng.normal(0.0, 0.04), rng.normal(0.0, 0.04), level * _HEIGHT_M) @ rotation(
+            "z", 180.0 * rng.integers(2)
+        )
         tint = np.array(_PAINTS[int(rng.integers(len(_PAINTS)))]) * rng.uniform(0.75, 1.1)
         batches.append(place(_container(variant), pose, tint=tint, dust=rng.uniform(0.1, 0.5)))
     return tuple(batches)
@@ -86,10 +115,12 @@ def _doors(rng: np.random.Generator, x_m: float) -> list[Mesh]:
     for sign in (-1.0, 1.0):
         open_deg = float(rng.choice([0.0, 0.0, 0.0, 100.0, 250.0]))
         rods = [((0.05, -sign * y, 0.1), (0.05, -sign * y, 2.3)) for y in (0.3, 0.75)]
-        leaf = join([
-            box((0.05, leaf_m, 2.3), None).at(0.0, -sign * leaf_m / 2, 0.0),
-            bars(np.array(rods), 0.04, srgb("#8d8c88")),
-        ])  # fmt: skip
+        leaf = join(
+            [
+                box((0.05, leaf_m, 2.3), None).at(0.0, -sign * leaf_m / 2, 0.0),
+                bars(np.array(rods), 0.04, srgb("#8d8c88")),
+            ]
+        )
         parts.append(leaf.moved(translation(x_m - 0.03, sign * (leaf_m + 0.02), 0.15) @ rotation("z", sign * open_deg)))
     parts.append(box((0.02, _WIDTH_M - 0.2, 2.3), srgb("#141210")).at(x_m - 1.2, 0.0, 0.15))
     parts.append(box((1.2, _WIDTH_M - 0.2, 0.05), srgb("#4d3d2e"), Surface.WOOD).at(x_m - 0.6, 0.0, 0.12))
@@ -121,10 +152,16 @@ def _hull(rng: np.random.Generator, size_m: tuple[float, float, float], overhang
     outside = _walls(low, high, None, Surface.PAINT)
     outside = rusted(outside, np.clip(rng.normal(0.2, 0.2, len(outside.vertices_m)), 0.0, 0.8))
     inside = _walls(high[::-1], low[::-1], srgb("#5a4536"), Surface.RUST)
-    return join([
-        outside, inside, floor, bars(rim, 0.1, None, Surface.PAINT), bars(np.array(ribs), 0.09, None, Surface.PAINT),
-        bars(np.array(skids), 0.12, srgb("#37312c")),
-    ])  # fmt: skip
+    return join(
+        [
+            outside,
+            inside,
+            floor,
+            bars(rim, 0.1, None, Surface.PAINT),
+            bars(np.array(ribs), 0.09, None, Surface.PAINT),
+            bars(np.array(skids), 0.12, srgb("#37312c")),
+        ]
+    )
 
 
 def _ring(length_m: float, width_m: float, z_m: float) -> FloatArray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 
@@ -73,9 +74,7 @@ def make_barriers(rng: np.random.Generator) -> tuple[Batch, ...]:
     """Build a short row of concrete or red and white plastic barriers."""
     count = int(rng.integers(1, 6))
     shift = (np.arange(count) - (count - 1) / 2) * 2.04
-    poses = np.stack(
-        [translation(x, rng.normal(0, 0.05), 0.0) @ rotation("z", rng.normal(0, 4)) for x in shift]
-    )  # fmt: skip
+    poses = np.stack([translation(x, rng.normal(0, 0.05), 0.0) @ rotation("z", rng.normal(0, 4)) for x in shift])
     if rng.random() < 0.5:
         tint = np.array(srgb("#a8a49a")) * rng.uniform(0.8, 1.1, (count, 1))
     else:
@@ -89,7 +88,7 @@ def _stand(
 ) -> FloatArray:
     """Return (N, 4, 4) poses of panels, local x along the path, sheared so that both ends touch the ground."""
     starts, stops = [], []
-    for first, last in zip(path_m[:-1], path_m[1:], strict=True):
+    for first, last in pairwise(path_m):
         count = max(1, round(float(np.linalg.norm(last - first)) / panel_m))
         share = np.linspace(0.0, 1.0, count + 1)[:, None]
         points = first + (last - first) * share
@@ -129,7 +128,7 @@ def _banners(rng: np.random.Generator, poses: FloatArray) -> tuple[Batch, ...]:
 @lru_cache(maxsize=1)
 def _mesh_panel() -> Mesh:
     x, top = 1.7, 2.0
-    frame = [((-x, 0, 0.12), (-x, 0, top)), ((x, 0, 0.12), (x, 0, top)), ((-x, 0, top), (x, 0, top))]
+    frame = [((-x, 0.0, 0.12), (-x, 0.0, top)), ((x, 0.0, 0.12), (x, 0.0, top)), ((-x, 0.0, top), (x, 0.0, top))]
     frame.append(((-x, 0.0, 0.18), (x, 0.0, 0.18)))
     wires = [((wire, 0.0, 0.18), (wire, 0.0, top)) for wire in np.linspace(-x, x, 16)[1:-1]]
     wires += [((-x, 0.0, z), (x, 0.0, z)) for z in np.linspace(0.18, top, 7)[1:-1]]
@@ -167,12 +166,16 @@ def _board() -> Mesh:
     posts = [((x, 0.09, 0.0), (x, 0.09, 2.1)) for x in (-1.2, 0.0)]
     braces = [((x, 0.06, 1.5), (x, 1.0, 0.05)) for x in (-1.2,)]
     rails = [((-1.25, 0.075, z), (1.25, 0.075, z)) for z in (0.5, 1.7)]
-    return join([
-        grid(sheet, None, Surface.PAINT, shade=shade).at(0.0, 0.0, 0.05),
-        grid(sheet, None, Surface.PAINT, shade=0.8 * shade).moved(translation(0, 0.01, 0.05) @ rotation("z", 180.0)),
-        bars(np.array([*posts, *braces, *rails]), 0.08, srgb("#8a7048"), Surface.WOOD),
-        box((2.5, 0.08, 0.06), None).at(0.0, 0.0, 2.12),
-    ])  # fmt: skip
+    return join(
+        [
+            grid(sheet, None, Surface.PAINT, shade=shade).at(0.0, 0.0, 0.05),
+            grid(sheet, None, Surface.PAINT, shade=0.8 * shade).moved(
+                translation(0, 0.01, 0.05) @ rotation("z", 180.0)
+            ),
+            bars(np.array([*posts, *braces, *rails]), 0.08, srgb("#8a7048"), Surface.WOOD),
+            box((2.5, 0.08, 0.06), None).at(0.0, 0.0, 2.12),
+        ]
+    )
 
 
 @lru_cache(maxsize=1)
@@ -196,14 +199,18 @@ def _tape(variant: int) -> Mesh:
 
 @lru_cache(maxsize=1)
 def _gate_leaf() -> Mesh:
-    edge = [((0.1, 0, z), (3.9, 0, z)) for z in (0.15, 1.1, 2.0)]
+    edge = [((0.1, 0.0, z), (3.9, 0.0, z)) for z in (0.15, 1.1, 2.0)]
     edge += [((x, 0.0, 0.15), (x, 0.0, 2.0)) for x in (0.1, 2.0, 3.9)]
     wires = [((x, 0.0, 0.15), (x, 0.0, 2.0)) for x in np.linspace(0.1, 3.9, 22)]
-    return join([
-        bars(np.array(edge), 0.06, srgb("#6f7476"), Surface.PAINT), bars(np.array(wires), 0.012, _ZINC),
-        cylinder(0.09, 2.3, srgb("#6f7476"), Surface.PAINT, sections=10).at(0.0, 0.0, 1.15),
-        box((0.6, 0.6, 0.3), _FOOT, Surface.CONCRETE), box((0.9, 0.03, 0.6), srgb("#d8b21e")).at(2.9, -0.02, 1.2),
-    ])  # fmt: skip
+    return join(
+        [
+            bars(np.array(edge), 0.06, srgb("#6f7476"), Surface.PAINT),
+            bars(np.array(wires), 0.012, _ZINC),
+            cylinder(0.09, 2.3, srgb("#6f7476"), Surface.PAINT, sections=10).at(0.0, 0.0, 1.15),
+            box((0.6, 0.6, 0.3), _FOOT, Surface.CONCRETE),
+            box((0.9, 0.03, 0.6), srgb("#d8b21e")).at(2.9, -0.02, 1.2),
+        ]
+    )
 
 
 def _tintable(mesh: Mesh) -> Mesh:

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 import shapely
+import trimesh
 
 from standoff.core.homography import FloatArray
-from standoff.simulation.mesh import Mesh, Surface, join, srgb
+from standoff.simulation.mesh import Colour, Mesh, Surface, rotation, scaling, srgb
 from standoff.simulation.props.materials import (
     FADED,
-    HOLE,
     SANDS,
     SOILS,
     STONES,
@@ -20,10 +21,12 @@ from standoff.simulation.props.materials import (
     WOODS,
     block,
     mound,
+    relief,
+    ripples,
     scattered,
-    single,
     stone,
     tints,
+    toned,
     varied,
 )
 from standoff.simulation.props.prop import Prop
@@ -31,8 +34,8 @@ from standoff.simulation.scene import Batch, place
 
 _STONE_VARIANTS = 8
 _WEEDS = (srgb("#5d6b33"), srgb("#7d7a45"), srgb("#8f8558"), srgb("#4b5a2c"))
+_SCRAPS = (*[WHITE_PLASTIC] * 4, *[srgb("#8f8b84")] * 4, *[srgb("#9a7b56")] * 5, *[srgb("#3a3937")] * 4, *FADED)
 _GRAVELS = (srgb("#8e8b85"), srgb("#a5a099"), srgb("#777470"))
-_LITTER_SHARES = {"stone": 0.62, "scrap": 0.2, "splinter": 0.12, "weed": 0.06}
 
 
 @varied
@@ -60,20 +63,156 @@ def _spread(rng: np.random.Generator) -> Mesh:
     return mound(rng, radius, rng.uniform(0.1, 0.3), None, lumps=0.5)
 
 
-def _heap_with_stones(rng: np.random.Generator) -> tuple[Batch, ...]:
-    """A heap of soil, and the clods and stones that rolled off it."""
-    heap = Prop("", 0.0, lambda _: ()) if False else None
-    raise AssertionError(heap)
+@varied
+def weed(rng: np.random.Generator) -> Mesh:
+    """Return a tuft of grass: leaning blades, each a thin triangle seen from both sides."""
+    count = 9
+    foot = np.column_stack([rng.normal(0.0, 0.04, (count, 2)), np.full(count, -0.02)])
+    turn = rng.uniform(0.0, 2 * np.pi, count)
+    across = 0.02 * np.column_stack([np.cos(turn), np.sin(turn), np.zeros(count)])
+    tip = foot + np.column_stack([rng.normal(0.0, 0.13, (count, 2)), rng.uniform(0.12, 0.4, count)])
+    corners = np.stack([foot - across, foot + across, tip], axis=1).reshape(-1, 3)
+    front = np.arange(3 * count).reshape(-1, 3)
+    solid = trimesh.Trimesh(np.tile(corners, (2, 1)), np.vstack([front, front[:, ::-1] + 3 * count]), process=False)
+    return toned(Mesh.of(solid, None, Surface.FOLIAGE, crease_deg=1.0), rng.uniform(0.6, 1.0))
 
 
 @varied
-def _weed(rng: np.random.Generator) -> Mesh:
-    """A tuft: a few blades, each a thin standing wedge seen from both sides."""
-    blades = []
-    for _ in range(7):
-        blade = block((0.035, 0.004, rng.uniform(0.2, 0.5)), None, Surface.FOLIAGE)
-        tapered = blade.vertices_m.copy()
-        tapered[:, 0] *= np.where(tapered[:, 2] > 0.05, 0.2, 1.0)
-        tapered[:, :2] += np.where(tapered[:, 2:] > 0.05, rng.normal(0.0, 0.13, 2), rng.normal(0.0, 0.03, 2))
-        blades.append(Mesh(tapered.astype(np.float32), *_looks(blade)))
-    return join(blades)
+def _scrap(rng: np.random.Generator) -> Mesh:
+    """A bent bit of sheet, film or cardboard of about unit size."""
+    xy = np.stack(np.meshgrid([-0.5, 0.0, 0.5], [-0.35, 0.35], indexing="ij"), axis=-1) + rng.normal(
+        0.0, 0.1, (3, 2, 2)
+    )
+    z = np.abs(rng.normal(0.05, 0.12, (3, 2, 1)))
+    return relief(np.concatenate([xy, z], axis=-1), None, Surface.PLASTIC)
+
+
+@varied
+def _splinter(rng: np.random.Generator) -> Mesh:
+    return block((1.0, rng.uniform(0.05, 0.15), rng.uniform(0.03, 0.08)), None, Surface.WOOD)
+
+
+def _stones_around(rng: np.random.Generator, count: int, near_m: float, far_m: float, size_m: float) -> Batch:
+    """Stones between two circles, more of them inside."""
+    turn = rng.uniform(0.0, 2 * np.pi, count)
+    reach = near_m + (far_m - near_m) * rng.beta(1.0, 2.5, count)
+    sizes = np.minimum(size_m * rng.lognormal(0.0, 0.5, count), 4 * size_m)
+    xy = reach[:, None] * np.column_stack([np.cos(turn), np.sin(turn)])
+    poses = scattered(rng, xy, 0.15 * sizes, sizes)
+    return place(
+        pebble(int(rng.integers(_STONE_VARIANTS))), poses, tint=tints(rng, STONES + SOILS, count, 0.3), dust=0.4
+    )
+
+
+def _heap(
+    build: Callable[[int], Mesh], palette: tuple[Colour, ...]
+) -> Callable[[np.random.Generator], tuple[Batch, ...]]:
+    """Return the maker of a heap with the clods and stones that rolled off it."""
+
+    def make(rng: np.random.Generator) -> tuple[Batch, ...]:
+        mesh = build(int(rng.integers(VARIANTS)))
+        grown = scaling(*rng.uniform(0.8, 1.15, 3))
+        reach_m = 0.8 * float(np.abs(mesh.vertices_m[:, 0]).max())
+        return (
+            place(mesh, rotation("z", rng.uniform(0.0, 360.0)) @ grown, tint=tints(rng, palette, 1), dust=0.15),
+            _stones_around(rng, 24, 0.7 * reach_m, 1.25 * reach_m, 0.09),
+        )
+
+    return make
+
+
+def _rubble(rng: np.random.Generator) -> tuple[Batch, ...]:
+    """Broken concrete and stones, in a heap of many sizes."""
+    radius_m, count = rng.uniform(0.7, 2.0), int(rng.integers(50, 110))
+    share = np.sqrt(rng.uniform(0.0, 1.0, count))
+    turn = rng.uniform(0.0, 2 * np.pi, count)
+    xy = radius_m * share[:, None] * np.column_stack([np.cos(turn), np.sin(turn)])
+    sizes = np.clip(0.25 * rng.lognormal(0.0, 0.5, count), 0.08, 0.9)
+    poses = scattered(rng, xy, 0.35 * radius_m * (1.0 - share) + 0.15 * sizes, sizes)
+    colours = tints(rng, STONES if rng.uniform() < 0.7 else (srgb("#9a5638"), *STONES), count, 0.25)
+    half = count // 2
+    kinds = rng.permutation(_STONE_VARIANTS)[:2]
+    return tuple(
+        place(pebble(int(kind)), poses[part], tint=colours[part], dust=0.35)
+        for kind, part in zip(kinds, (slice(half), slice(half, None)), strict=True)
+    )
+
+
+def _scattered_stones(rng: np.random.Generator) -> tuple[Batch, ...]:
+    return (_stones_around(rng, int(rng.integers(15, 50)), 0.0, rng.uniform(0.6, 1.8), 0.14),)
+
+
+def _weeds(rng: np.random.Generator) -> tuple[Batch, ...]:
+    count = int(rng.integers(6, 25))
+    xy = rng.normal(0.0, 0.45, (count, 2)).clip(-1.2, 1.2)
+    poses = scattered(rng, xy, 0.0, rng.uniform(0.6, 1.6, count))
+    return (place(weed(int(rng.integers(VARIANTS))), poses, tint=tints(rng, _WEEDS, count, 0.25), dust=0.1),)
+
+
+def scatter_litter(
+    rng: np.random.Generator, count: int, region: shapely.Polygon, height_at: Callable[[FloatArray], FloatArray]
+) -> tuple[Batch, ...]:
+    """Strew small stones, scraps, splinters and weeds over an area, thick in some places and thin in others.
+
+    Args:
+        rng: Decides everything.
+        count: How many pieces.
+        region: Where, site frame.
+        height_at: Returns the (N,) ground heights under (N, 2).
+    """
+    xy = _patchy(rng, count, region)
+    z = height_at(xy)
+    kinds = rng.choice(len(_LITTER), size=len(xy), p=[kind.share for kind in _LITTER])
+    batches = []
+    for number, kind in enumerate(_LITTER):
+        chosen = np.flatnonzero(kinds == number)
+        sizes = np.minimum(kind.size_m * rng.lognormal(0.0, 0.5, len(chosen)), 5 * kind.size_m)
+        poses = scattered(rng, xy[chosen], z[chosen] + kind.lift * sizes, sizes)
+        colours = tints(rng, kind.palette, len(chosen), 0.25)
+        for variant in range(kind.variants):
+            batches.append(place(kind.build(variant), poses[variant :: kind.variants], tint=colours[variant :: kind.variants],
+                                 dust=0.35))  # fmt: skip
+    return tuple(batch for batch in batches if len(batch.poses))
+
+
+@dataclass(frozen=True, slots=True)
+class _Litter:
+    """A kind of small things: its share of all, median size, lift of its centre in sizes, colours."""
+
+    build: Callable[[int], Mesh]
+    variants: int
+    share: float
+    size_m: float
+    lift: float
+    palette: tuple[Colour, ...]
+
+
+_LITTER = (
+    _Litter(pebble, _STONE_VARIANTS, 0.64, 0.09, 0.12, STONES + SOILS),
+    _Litter(_scrap, 4, 0.14, 0.2, 0.0, _SCRAPS),
+    _Litter(_splinter, 3, 0.15, 0.55, 0.0, WOODS),
+    _Litter(weed, 3, 0.07, 0.9, 0.0, _WEEDS),
+)
+
+
+def _patchy(rng: np.random.Generator, count: int, region: shapely.Polygon) -> FloatArray:
+    """Return (count, 2) points in a region, at most places few, in some many."""
+    west, south, east, north = region.bounds
+    waves = int(rng.integers(2**31))
+    found = np.empty((0, 2))
+    while len(found) < count:
+        xy = rng.uniform((west, south), (east, north), (4 * count, 2))
+        thick = ripples(np.random.default_rng(waves), xy, 11.0, 3)
+        wanted = rng.uniform(0.0, 1.0, len(xy)) < 0.12 + 0.5 * np.clip(thick, 0.0, 1.2)
+        found = np.concatenate([found, xy[wanted & shapely.contains_xy(region, xy[:, 0], xy[:, 1])]])
+    return found[:count]
+
+
+HEAPS: tuple[Prop, ...] = (
+    Prop("soil heap", 3.4, _heap(_soil_heap, SOILS), 1.8),
+    Prop("sand heap", 2.9, _heap(_sand_heap, SANDS + _GRAVELS), 1.6),
+    Prop("spread material", 2.8, _heap(_spread, SOILS + SANDS + _GRAVELS), 1.2),
+    Prop("rubble", 2.2, _rubble, 1.3),
+    Prop("scattered stones", 1.9, _scattered_stones, 1.5),
+    Prop("weeds", 1.4, _weeds, 1.2),
+)

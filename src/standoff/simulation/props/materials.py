@@ -8,7 +8,7 @@ from __future__ import annotations
 import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cache
 
 import numpy as np
 import trimesh
@@ -55,12 +55,12 @@ VARIANTS = 6
 """Shapes of each family; pose, stretch, tint and dust make the rest of the variety."""
 
 
-@lru_cache(maxsize=None)
+@cache
 def _unit_box(colour: Colour | None, surface: Surface) -> Mesh:
     return box((1.0, 1.0, 1.0), colour, surface)
 
 
-@lru_cache(maxsize=None)
+@cache
 def _unit_bar(colour: Colour | None, surface: Surface, sections: int, capped: bool) -> Mesh:
     bar = cylinder(1.0, 1.0, colour, surface, sections=sections).at(0.0, 0.0, 0.5)
     if capped:
@@ -222,7 +222,7 @@ def single(
 def varied(build: Callable[[np.random.Generator], Mesh]) -> Callable[[int], Mesh]:
     """Turn a builder of random meshes into one of numbered variants, each built once and kept."""
 
-    @lru_cache(maxsize=None)
+    @cache
     def variant(number: int) -> Mesh:
         return build(np.random.default_rng((number, zlib.crc32(build.__name__.encode()))))
 

@@ -230,7 +230,9 @@ def _manhole_rings(rng: np.random.Generator) -> Mesh:
         ring = tubular(radius, 0.86 * radius, 0.5, CONCRETE, Surface.CONCRETE).at(0.0, 0.0, 0.25)
         for level in range(int(rng.integers(1, 4))):
             shift = rng.normal(0.0, 0.02, 2)
-            parts.append(toned(ring, rng.uniform(0.8, 1.1)).at(shift[0] + 2.15 * radius * number, shift[1], 0.51 * level))
+            parts.append(
+                toned(ring, rng.uniform(0.8, 1.1)).at(shift[0] + 2.15 * radius * number, shift[1], 0.51 * level)
+            )
     joined = join(parts)
     return joined.at(-float(np.ptp(joined.vertices_m[:, 0])) / 2 + radius, 0.0, 0.0)
 

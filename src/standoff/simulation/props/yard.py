@@ -11,7 +11,9 @@ from standoff.simulation.bars import bars
 from standoff.simulation.mesh import Mesh, Surface, box, cylinder, join, lathe, rotation, slab, srgb, translation
 from standoff.simulation.scene import Batch, place
 
-_STEEL_DRUMS = tuple(srgb(code) for code in ("#1f4f8a", "#2a2a2a", "#7a2e20", "#3c6b3f", "#6a625a", "#b88a1e", "#8c8f90"))
+_STEEL_DRUMS = tuple(
+    srgb(code) for code in ("#1f4f8a", "#2a2a2a", "#7a2e20", "#3c6b3f", "#6a625a", "#b88a1e", "#8c8f90")
+)
 _PLASTIC_DRUMS = tuple(srgb(code) for code in ("#1c57a5", "#2366b3", "#1e4a8c", "#d5d6d2", "#23231f"))
 
 
@@ -50,7 +52,9 @@ def make_signs(rng: np.random.Generator) -> tuple[Batch, ...]:
     batches = []
     for k in range(count):
         pose = translation((k - (count - 1) / 2) * 1.1, rng.normal(0, 0.1), 0.0) @ rotation("z", rng.normal(0, 15))
-        batches.append(place(_sign(int(rng.integers(5))), pose @ rotation("y", rng.normal(0, 2)), dust=rng.uniform(0, 0.5)))
+        batches.append(
+            place(_sign(int(rng.integers(5))), pose @ rotation("y", rng.normal(0, 2)), dust=rng.uniform(0, 0.5))
+        )
     return tuple(batches)
 
 
@@ -102,15 +106,27 @@ def _sign(variant: int) -> Mesh:
     post = bars(np.array([((0.0, 0.0, 0.0), (0.0, 0.0, 2.1))]), 0.06, srgb("#9a9d9e"))
     foot = box((0.5, 0.4, 0.12), srgb("#26261f"), Surface.RUBBER)
     faces = {
-        0: (cylinder(0.33, 0.03, srgb("#c3201c"), axis="x", sections=20), cylinder(0.24, 0.04, srgb("#dddad2"), axis="x")),
-        1: (box((0.03, 0.6, 0.8), srgb("#e0b51a")).at(0, 0, -0.4), box((0.04, 0.45, 0.12), srgb("#1c1b19")).at(0, 0, 0.1)),
-        2: (cylinder(0.33, 0.03, srgb("#1d4f9e"), axis="x", sections=20), box((0.04, 0.1, 0.35), (0.7, 0.7, 0.7)).at(0, 0, -0.2)),
-        3: (box((0.03, 0.9, 0.6), srgb("#dcdad4")).at(0, 0, -0.3), box((0.04, 0.7, 0.2), srgb("#b3262a")).at(0, 0, 0.02)),
+        0: (
+            cylinder(0.33, 0.03, srgb("#c3201c"), axis="x", sections=20),
+            cylinder(0.24, 0.04, srgb("#dddad2"), axis="x"),
+        ),
+        1: (
+            box((0.03, 0.6, 0.8), srgb("#e0b51a")).at(0, 0, -0.4),
+            box((0.04, 0.45, 0.12), srgb("#1c1b19")).at(0, 0, 0.1),
+        ),
+        2: (
+            cylinder(0.33, 0.03, srgb("#1d4f9e"), axis="x", sections=20),
+            box((0.04, 0.1, 0.35), (0.7, 0.7, 0.7)).at(0, 0, -0.2),
+        ),
+        3: (
+            box((0.03, 0.9, 0.6), srgb("#dcdad4")).at(0, 0, -0.3),
+            box((0.04, 0.7, 0.2), srgb("#b3262a")).at(0, 0, 0.02),
+        ),
         4: (
             cylinder(0.42, 0.03, srgb("#c3201c"), axis="x", sections=3).moved(rotation("x", 90.0)),
             cylinder(0.27, 0.04, srgb("#e0c03a"), axis="x", sections=3).moved(rotation("x", 90.0)),
         ),
-    }  # fmt: skip
+    }
     return join([post, foot, *(face.at(0.05, 0.0, 1.75) for face in faces[variant])])
 
 

@@ -45,6 +45,12 @@ class Frustum:
         matrix[3, :3] = forward
         return matrix
 
+    def undistorted_from_drawn(self) -> FloatArray:
+        """Return the (3, 3) offset from pixels of the drawn picture to undistorted pixels."""
+        shift = np.eye(3)
+        shift[:2, 2] = self.origin_px
+        return shift
+
     def planes(self) -> FloatArray:
         """Return (5, 4) inward unit normals and distances (from the camera) of left, right, top, bottom, near."""
         clip = self.clip_from_offset()
@@ -55,7 +61,7 @@ class Frustum:
         return unit
 
     def sees(
-        self, centre_m: npt.NDArray[np.float32], radius_m: npt.NDArray[np.float32], smallest_px: float
+        self, centre_m: npt.NDArray[np.float32], radius_m: npt.NDArray[np.float32], smallest_px: float = 0.0
     ) -> npt.NDArray[np.bool_]:
         """Return (N,) which spheres touch the picture and are not smaller than a radius in pixels."""
         planes = self.planes().astype(np.float32)

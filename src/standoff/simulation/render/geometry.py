@@ -11,6 +11,8 @@ from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from standoff.simulation.mesh import Float32Array, Mesh
 from standoff.simulation.scene import Batch
@@ -28,8 +30,34 @@ def vertex_table(mesh: Mesh) -> Float32Array:
     return np.hstack([*columns, height_m[:, None]]).astype(np.float32)
 
 
+def split_closed(mesh: Mesh) -> tuple[npt.NDArray[np.uint32], int]:
+    """Put the triangles of closed solids first: their inner sides can never be seen and need not be drawn.
+
+    Returns:
+        (T, 3) triangles in the new order and how many belong to solids all of whose edges have their opposite.
+    """
+    places = np.round(mesh.vertices_m * 1e5).astype(np.int64) + (1 << 20)
+    _, welded = np.unique(places @ np.array([1 << 42, 1 << 21, 1]), return_inverse=True)
+    corners = welded[mesh.triangles.astype(np.int64)]
+    start, stop = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
+    count = int(welded.max(initial=-1)) + 1
+    forth, back = start * count + stop, stop * count + start
+    lonely = ~np.isin(forth, back)
+    solids, solid = connected_components(coo_array((np.ones(len(start), bool), (start, stop)), (count, count)))
+    open_solid = np.zeros(solids, bool)
+    open_solid[solid[start[lonely]]] = True
+    open_triangle = open_solid[solid[corners[:, 0]]]
+    return mesh.triangles[np.argsort(open_triangle, kind="stable")], int((~open_triangle).sum())
+
+
 class Arena:
-    """Meshes in GPU memory, each uploaded once for as long as the renderer lives."""
+    """Meshes in GPU memory, each uploaded once for as long as the renderer lives.
+
+    Attributes:
+        generation: Grows whenever the buffers are replaced.
+        ranges: Of each mesh: first index, number of indices, how many of them are of closed solids, first vertex.
+        spheres: Of each mesh: bounding sphere, local frame.
+    """
 
     def __init__(self, context: Any) -> None:  # noqa: ANN401
         self._context = context
@@ -42,9 +70,7 @@ class Arena:
     def _clear(self) -> None:
         self._meshes.clear()
         self._vertex_count = self._index_count = 0
-        self.first_index: list[int] = []
-        self.index_count: list[int] = []
-        self.base_vertex: list[int] = []
+        self.ranges: list[tuple[int, int, int, int]] = []
         self.spheres: list[tuple[float, float, float, float]] = []
 
     @property
@@ -66,15 +92,14 @@ class Arena:
         return known[1]
 
     def _upload(self, mesh: Mesh) -> int:
-        vertices, indices = vertex_table(mesh), np.ascontiguousarray(mesh.triangles, dtype=np.uint32)
+        triangles, closed_count = split_closed(mesh)
+        vertices, indices = vertex_table(mesh), np.ascontiguousarray(triangles, dtype=np.uint32)
         self._vertices = self._room(self._vertices, 4 * _VERTEX_FLOATS * self._vertex_count, vertices.nbytes)
         self._indices = self._room(self._indices, 4 * self._index_count, indices.nbytes)
         if vertices.size and indices.size:
             self._vertices.write(vertices.tobytes(), offset=4 * _VERTEX_FLOATS * self._vertex_count)
             self._indices.write(indices.tobytes(), offset=4 * self._index_count)
-        self.first_index.append(self._index_count)
-        self.index_count.append(indices.size)
-        self.base_vertex.append(self._vertex_count)
+        self.ranges.append((self._index_count, indices.size, 3 * closed_count, self._vertex_count))
         low, high = mesh.vertices_m.min(axis=0, initial=np.inf), mesh.vertices_m.max(axis=0, initial=-np.inf)
         centre = (low + high) / 2
         radius = np.sqrt(((mesh.vertices_m - centre) ** 2).sum(axis=1).max(initial=0.0))
@@ -99,13 +124,13 @@ class Instances:
     """Meshes in their places.
 
     Attributes:
-        mesh: (N,) number in the arena.
+        kind: (N,) twice the mesh's number in the arena, one more where the pose mirrors.
         rows: (N, 18) as the shaders read them: three rows of the pose, tint, dust, entity id, a random number.
         centre_m: (N, 3) of the bounding sphere, site frame.
         radius_m: (N,) of the bounding sphere.
     """
 
-    mesh: IntArray
+    kind: IntArray
     rows: Float32Array
     centre_m: Float32Array
     radius_m: Float32Array
@@ -129,22 +154,24 @@ class Instances:
         rows[:, 12:15] = np.concatenate([batch.tint for batch in batches])
         rows[:, 15] = np.concatenate([batch.dust for batch in batches])
         rows[:, 16] = np.repeat([batch.entity_id for batch in batches], counts)
-        # Not from the place, which moves: the pattern must stay on a thing that drives.
-        rows[:, 17] = np.concatenate([np.arange(count) for count in counts]) * 0.618 % 1.0 + mesh * 0.381 % 1.0
+        # Not from the place, which moves, nor from the mesh's number, which depends on the scenes before.
+        first = np.repeat([len(batch.mesh.vertices_m) * 0.381 for batch in batches], counts)
+        rows[:, 17] = (first + np.concatenate([np.arange(count) for count in counts]) * 0.618) % 1.0
         spheres = np.array(arena.spheres, dtype=np.float32)[mesh]
-        centre = np.einsum("nij,nj->ni", poses[:, :3, :3], spheres[:, :3]) + poses[:, :3, 3]
-        stretch = np.sqrt((poses[:, :3, :3] ** 2).sum(axis=1).max(axis=1))
-        return cls(mesh, rows, centre, spheres[:, 3] * stretch)
+        linear = poses[:, :3, :3]
+        centre = np.einsum("nij,nj->ni", linear, spheres[:, :3]) + poses[:, :3, 3]
+        stretch = np.sqrt((linear**2).sum(axis=1).max(axis=1))
+        return cls(2 * mesh + (np.linalg.det(linear) < 0), rows, centre, spheres[:, 3] * stretch)
 
     def __len__(self) -> int:
-        return len(self.mesh)
+        return len(self.kind)
 
     def __getitem__(self, chosen: npt.NDArray[np.bool_] | IntArray) -> Self:
-        return type(self)(self.mesh[chosen], self.rows[chosen], self.centre_m[chosen], self.radius_m[chosen])
+        return type(self)(self.kind[chosen], self.rows[chosen], self.centre_m[chosen], self.radius_m[chosen])
 
     def __add__(self, other: Instances) -> Self:
         return type(self)(
-            np.concatenate([self.mesh, other.mesh]),
+            np.concatenate([self.kind, other.kind]),
             np.concatenate([self.rows, other.rows]),
             np.concatenate([self.centre_m, other.centre_m]),
             np.concatenate([self.radius_m, other.radius_m]),
@@ -155,25 +182,26 @@ class Instances:
         if not len(self):
             return self
         away_m = np.sqrt(((self.centre_m - eye_m.astype(np.float32)) ** 2).sum(axis=1)) - self.radius_m
-        nearest_m = np.full(int(self.mesh.max()) + 1, np.inf, np.float32)
-        np.minimum.at(nearest_m, self.mesh, away_m)
-        return self[np.lexsort((away_m, self.mesh, nearest_m[self.mesh]))]
+        nearest_m = np.full(int(self.kind.max()) + 1, np.inf, np.float32)
+        np.minimum.at(nearest_m, self.kind, away_m)
+        return self[np.lexsort((away_m, self.kind, nearest_m[self.kind]))]
 
 
-def draw_commands(instances: Instances, arena: Arena) -> npt.NDArray[np.uint32]:
-    """Return (D, 5) indirect draw commands for instances in which equal meshes are neighbours."""
+def draw_commands(instances: Instances, arena: Arena) -> tuple[npt.NDArray[np.uint32], int]:
+    """Return (D, 5) indirect draw commands for instances in which equal kinds are neighbours.
+
+    The first commands, as many as the second result says, are of closed solids.
+    """
     if not len(instances):
-        return np.empty((0, 5), np.uint32)
-    starts = np.flatnonzero(np.diff(instances.mesh, prepend=-1))
-    mesh = instances.mesh[starts]
-    columns = (
-        np.array(arena.index_count)[mesh],
-        np.diff(starts, append=len(instances)),
-        np.array(arena.first_index)[mesh],
-        np.array(arena.base_vertex)[mesh],
-        starts,
-    )
-    return np.stack(columns, axis=1).astype(np.uint32)
+        return np.empty((0, 5), np.uint32), 0
+    starts = np.flatnonzero(np.diff(instances.kind, prepend=-1))
+    kind = instances.kind[starts]
+    first, count, closed, vertex = np.array(arena.ranges)[kind // 2].T
+    closed = np.where(kind % 2, 0, closed)
+    placed = np.diff(starts, append=len(instances))
+    solid = np.stack([closed, placed, first, vertex, starts], axis=1)[closed > 0]
+    rest = np.stack([count - closed, placed, first + closed, vertex, starts], axis=1)[count > closed]
+    return np.concatenate([solid, rest]).astype(np.uint32), len(solid)
 
 
 class InstanceDrawer:
@@ -190,8 +218,8 @@ class InstanceDrawer:
         self._generation = -1
 
     def draw(self, instances: Instances, arena: Arena) -> None:
-        """Draw into the framebuffer in use; equal meshes must be neighbours."""
-        commands = draw_commands(instances, arena)
+        """Draw into the framebuffer in use; equal kinds must be neighbours."""
+        commands, solids = draw_commands(instances, arena)
         if not len(commands):
             return
         if instances.rows.nbytes > self._rows.size:
@@ -205,7 +233,12 @@ class InstanceDrawer:
         self._commands.write(commands.data)
         if self._generation != arena.generation:
             self._bind(arena)
-        self._array.render_indirect(self._commands, count=len(commands))
+        if solids:
+            self._context.enable(self._context.CULL_FACE)
+            self._array.render_indirect(self._commands, count=solids)
+            self._context.disable(self._context.CULL_FACE)
+        if solids < len(commands):
+            self._array.render_indirect(self._commands, count=len(commands) - solids, first=solids)
 
     def _bind(self, arena: Arena) -> None:
         vertices, indices = arena.buffers
@@ -213,9 +246,7 @@ class InstanceDrawer:
         for buffer, (layout, names) in ((vertices, self._VERTEX), (self._rows, self._INSTANCE)):
             kept = [name if name in self.program else None for name in names]
             parts, _, divisor = layout.partition("/")
-            padded = [
-                part if name else f"{4 * int(part[0])}x" for part, name in zip(parts.split(), kept, strict=True)
-            ]
+            padded = [part if name else f"{4 * int(part[0])}x" for part, name in zip(parts.split(), kept, strict=True)]
             used.append((buffer, " ".join(padded) + ("/" + divisor if divisor else ""), *filter(None, kept)))
         if self._array is not None:
             self._array.release()

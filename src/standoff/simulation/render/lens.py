@@ -10,7 +10,7 @@ from scipy.interpolate import make_interp_spline
 from standoff.core.camera import Camera
 from standoff.core.homography import FloatArray
 
-_STEP_PX = 12
+_STEP_PX = 24
 _MARGIN_PX = 12
 
 
@@ -51,14 +51,10 @@ def _undistorted_grid(camera: Camera, x: FloatArray, y: FloatArray) -> FloatArra
     """Return (len(y), len(x), 2), from a cubic spline through a coarse grid where the lens is smooth."""
     if not camera.distortion.any():
         return np.stack(np.meshgrid(x, y), axis=-1).astype(np.float64)
-    if min(len(x), len(y)) < 6 * _STEP_PX:
-        return _exact_grid(camera, x, y)
-    knots = [np.linspace(axis[0], axis[-1], len(axis) // _STEP_PX + 2) for axis in (x, y)]
+    knots = [np.linspace(axis[0], axis[-1], len(axis) // _STEP_PX + 5) for axis in (x, y)]
     coarse = _exact_grid(camera, *knots)
     if np.isnan(coarse).any():
         return _exact_grid(camera, x, y)
-    across, down = (
-        make_interp_spline(knot, np.eye(len(knot)))(axis) for knot, axis in zip(knots, (x, y), strict=True)
-    )
+    across, down = (make_interp_spline(knot, np.eye(len(knot)))(axis) for knot, axis in zip(knots, (x, y), strict=True))
     fine: FloatArray = np.stack([down @ coarse[..., i] @ across.T for i in range(2)], axis=-1)
     return fine

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Protocol
 
 import cv2
 import numpy as np
@@ -10,12 +10,19 @@ import numpy.typing as npt
 
 from standoff.core.homography import FloatArray
 from standoff.simulation.mesh import Float32Array
-from standoff.simulation.render.frustum import Frustum
 from standoff.simulation.scene import Ground
 
 _TILE_CELLS = 32
 _BEYOND_M = 2500.0
 _LUMA = np.array([0.21, 0.72, 0.07])
+
+
+class Culler(Protocol):
+    """Who can tell which bounding spheres matter: a camera's frustum, the sun's box."""
+
+    def sees(self, centre_m: Float32Array, radius_m: Float32Array) -> npt.NDArray[np.bool_]:
+        """Return (N,) which spheres may be seen."""
+        ...
 
 
 def grid_vertices(ground: Ground) -> Float32Array:
@@ -117,11 +124,9 @@ class Relief:
         dust: FloatArray = np.clip(1.25 * (0.8 * mean + 0.2 * (mean @ _LUMA)) + 0.02, 0.0, 0.6)
         return dust
 
-    def draw(self, program: Any, frustum: Frustum | None) -> None:  # noqa: ANN401
-        """Draw the tiles that a picture can show, or all."""
-        chosen = self._commands
-        if frustum is not None:
-            chosen = chosen[frustum.sees(self._centre_m, self._radius_m, 0.0)]
+    def draw(self, program: Any, seen_by: Culler) -> None:  # noqa: ANN401
+        """Draw the tiles that a camera or the sun can see."""
+        chosen = self._commands[seen_by.sees(self._centre_m, self._radius_m)]
         if not len(chosen):
             return
         if program.glo not in self._arrays:

@@ -7,16 +7,20 @@ from typing import Any
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from standoff.core.homography import FloatArray
 from standoff.simulation.render.context import build_program, set_uniforms
 from standoff.simulation.render.frustum import Frustum
 from standoff.simulation.render.geometry import Arena, InstanceDrawer, Instances
 from standoff.simulation.render.relief import Relief
+from standoff.simulation.scene import Light
 
-SHADOW_SIZE_PX = 4096
+_LARGE_PX, _SMALL_PX = 4096, 3072
+_LARGE_PICTURE_PX = 1400
 _REACH_M = 160.0
 _OBJECTS_M = 9.0
+_MARGIN_M = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,14 +45,21 @@ class SunBox:
         matrix[:3, 3] = -(self.high_m + self.low_m) / size
         return matrix
 
-    def casts(self, instances: Instances) -> Instances:
-        """Return the instances that may throw a shadow into the box, larger than half a texel."""
-        across = instances.centre_m @ self.axes[:2].T.astype(np.float32)
-        radius = instances.radius_m[:, None]
-        inside = ((across > self.low_m[:2] - radius) & (across < self.high_m[:2] + radius)).all(axis=1)
-        texel_m = float((self.high_m - self.low_m)[:2].max()) / SHADOW_SIZE_PX
-        chosen = instances[inside & (instances.radius_m > 0.7 * texel_m)]
-        return chosen[np.argsort(chosen.mesh, kind="stable")]
+    def sees(
+        self, centre_m: npt.NDArray[np.float32], radius_m: npt.NDArray[np.float32], smallest_m: float = 0.0
+    ) -> npt.NDArray[np.bool_]:
+        """Return (N,) which spheres may throw a shadow into the box and are larger than a radius."""
+        across = centre_m @ self.axes[:2].T.astype(np.float32)
+        reach = radius_m[:, None]
+        inside = ((across > self.low_m[:2] - reach) & (across < self.high_m[:2] + reach)).all(axis=1)
+        seen: npt.NDArray[np.bool_] = inside & (radius_m > smallest_m)
+        return seen
+
+    def casters(self, instances: Instances, size_px: int) -> Instances:
+        """Return the instances that may throw a shadow wider than a texel into the box, equal kinds together."""
+        texel_m = float((self.high_m - self.low_m)[:2].max()) / size_px
+        chosen = instances[self.sees(instances.centre_m, instances.radius_m, 0.7 * texel_m)]
+        return chosen[np.argsort(chosen.kind, kind="stable")]
 
 
 def seen_points(frustum: Frustum, lowest_m: float, highest_m: float) -> FloatArray:
@@ -87,35 +98,51 @@ def fit_box(to_sun: FloatArray, points_m: FloatArray, casters: Instances, margin
 
 
 class ShadowMap:
-    """Depth along the sun's rays, drawn for every picture."""
+    """Depth along the sun's rays, drawn for every picture.
 
-    def __init__(self, context: Any) -> None:  # noqa: ANN401
+    Attributes:
+        size_px: Side of the square map.
+    """
+
+    def __init__(self, context: Any, picture_px: tuple[int, int]) -> None:  # noqa: ANN401
         self._context = context
-        size = (SHADOW_SIZE_PX, SHADOW_SIZE_PX)
-        self.depth = context.depth_texture(size)
-        self.depth.compare_func = "<="
-        self.depth.repeat_x = self.depth.repeat_y = False
-        self._target = context.framebuffer(depth_attachment=self.depth)
-        self.compared = context.sampler(texture=self.depth)
-        self.compared.filter = (context.LINEAR, context.LINEAR)
-        self.compared.compare_func = "<="
-        self.compared.repeat_x = self.compared.repeat_y = False
-        self.plain = context.sampler(texture=self.depth)
-        self.plain.filter = (context.NEAREST, context.NEAREST)
-        self.plain.compare_func = ""
-        self.plain.repeat_x = self.plain.repeat_y = False
-        self._instances = InstanceDrawer(context, build_program(context, ("depth_instances.vert",), ("nothing.frag",)))
+        self.size_px = _LARGE_PX if max(picture_px) > _LARGE_PICTURE_PX else _SMALL_PX
+        self._depth = context.depth_texture((self.size_px, self.size_px))
+        self._target = context.framebuffer(depth_attachment=self._depth)
+        self._compared = self._sampler("<=", context.LINEAR)
+        self._plain = self._sampler("", context.NEAREST)
+        self._things = InstanceDrawer(context, build_program(context, ("depth_instances.vert",), ("nothing.frag",)))
         self._ground = build_program(context, ("depth_ground.vert",), ("nothing.frag",))
 
-    def draw(self, box: SunBox, instances: Instances, arena: Arena, relief: Relief) -> None:
-        """Draw all casters of a box."""
-        # The viewport belongs to the framebuffer in moderngl: use() restores it, nothing else may set it here.
+    def _sampler(self, comparison: str, smoothness: int) -> Any:  # noqa: ANN401
+        sampler = self._context.sampler(texture=self._depth)
+        sampler.filter = (smoothness, smoothness)
+        sampler.compare_func = comparison
+        sampler.repeat_x = sampler.repeat_y = False
+        return sampler
+
+    def use(self, compared_unit: int, plain_unit: int) -> None:
+        """Bind the map twice: once for comparison, once for its depths."""
+        self._compared.use(compared_unit)
+        self._plain.use(plain_unit)
+
+    def unuse(self, compared_unit: int, plain_unit: int) -> None:
+        """Unbind the samplers, which would otherwise rule over the textures of later passes."""
+        self._compared.clear(compared_unit)
+        self._plain.clear(plain_unit)
+
+    def draw(self, light: Light, frustum: Frustum, instances: Instances, arena: Arena, relief: Relief) -> SunBox:
+        """Draw everything that can shade what the camera sees."""
+        points = seen_points(frustum, relief.lowest_m, relief.highest_m + _OBJECTS_M)
+        box = fit_box(light.to_sun, points, instances, _MARGIN_M)
+        # The viewport belongs to the framebuffer: setting it on the context here would draw no shadow at all.
         self._target.use()
         self._target.clear(depth=1.0)
-        clip = {"clip_from_offset": box.clip_from_site(), "origin": (0.0, 0.0, 0.0)}
+        self._context.enable_only(self._context.DEPTH_TEST)
         self._context.polygon_offset = (1.5, 2.0)
-        for program in (self._ground, self._instances.program):
-            set_uniforms(program, clip)
-        self._instances.draw(box.casts(instances), arena)
-        relief.draw(self._ground, None)
+        for program in (self._ground, self._things.program):
+            set_uniforms(program, {"clip_from_offset": box.clip_from_site(), "origin": (0.0, 0.0, 0.0)})
+        self._things.draw(box.casters(instances, self.size_px), arena)
+        relief.draw(self._ground, box)
         self._context.polygon_offset = (0.0, 0.0)
+        return box

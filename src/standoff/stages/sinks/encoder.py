@@ -8,6 +8,8 @@ from typing import Any
 
 import av
 import cv2
+from av.video.codeccontext import VideoCodecContext
+from av.video.reformatter import ColorRange, Colorspace, VideoReformatter
 
 from standoff.core.errors import MissingDependency
 from standoff.core.types import ImageArray
@@ -17,6 +19,7 @@ _TIME_BASE = Fraction(1, 60_000)  # frames of 23.976 to 60 Hz last whole ticks; 
 _KEYFRAME_EVERY_S = 2.0
 _ENCODERS = ("libx264", "libopenh264", "mpeg4")
 _NOMINAL_FPS = 30
+_BT709 = 1  # of primaries and transfer, in libav's numbering
 
 
 class VideoFile:
@@ -31,13 +34,19 @@ class VideoFile:
         size_px: (width, height), both even.
         crf: x264's rate factor; other encoders get a bit rate of similar quality.
         preset: x264's preset.
+        bit_rate_bps: Mean bits a second as cameras have it, in place of `crf`.
+        bt709: Colours as high-definition cameras code them, and marked so; otherwise BT.601, which is quicker.
 
     Raises:
         MissingDependency: This build of PyAV has no encoder for MP4.
     """
 
-    def __init__(self, path: Path, size_px: tuple[int, int], *, crf: int, preset: str) -> None:
+    def __init__(
+        self, path: Path, size_px: tuple[int, int], *, preset: str, crf: int = 23, bit_rate_bps: int | None = None,
+        bt709: bool = False,
+    ) -> None:  # fmt: skip
         self._path = path
+        self._reformatter = VideoReformatter() if bt709 else None
         encoder = available_encoder()
         options = {"movflags": "frag_keyframe+empty_moov+default_base_moof", "flush_packets": "1"}
         self._container = av.open(str(path), "w", format="mp4", options=options)
@@ -47,7 +56,12 @@ class VideoFile:
         self._stream.codec_context.time_base = _TIME_BASE
         # without B-frames each fragment holds all of its pictures, and presentation times need no shift
         self._stream.codec_context.max_b_frames = 0
-        if encoder == "libx264":
+        if bt709:
+            _mark_bt709(self._stream.codec_context)
+        if bit_rate_bps is not None:
+            self._stream.bit_rate = bit_rate_bps
+            self._stream.options = {"preset": preset} if encoder == "libx264" else {}
+        elif encoder == "libx264":
             self._stream.options = {"crf": str(crf), "preset": preset}
         else:
             self._stream.bit_rate = int(size_px[0] * size_px[1] * _NOMINAL_FPS * 0.1)
@@ -62,7 +76,7 @@ class VideoFile:
             time_s: When it is shown, from the start of the file; moved on by one tick where it does not increase.
         """
         ticks = max(round(time_s / _TIME_BASE), self._last_ticks + 1)
-        frame = av.VideoFrame.from_ndarray(cv2.cvtColor(picture, cv2.COLOR_BGR2YUV_I420), format="yuv420p")
+        frame = self._coded(picture)
         frame.pts, frame.time_base = ticks, _TIME_BASE
         frame.duration = ticks - self._last_ticks if self._last_ticks >= 0 else round(1 / _NOMINAL_FPS / _TIME_BASE)
         if self._keyframe_ticks is None or ticks - self._keyframe_ticks >= _KEYFRAME_EVERY_S / _TIME_BASE:
@@ -70,6 +84,17 @@ class VideoFile:
             self._keyframe_ticks = ticks
         self._last_ticks = ticks
         self._container.mux(self._stream.encode(frame))
+
+    def _coded(self, picture: ImageArray) -> av.VideoFrame:
+        if self._reformatter is None:
+            return av.VideoFrame.from_ndarray(cv2.cvtColor(picture, cv2.COLOR_BGR2YUV_I420), format="yuv420p")
+        return self._reformatter.reformat(
+            av.VideoFrame.from_ndarray(picture, format="bgr24"),
+            format="yuv420p",
+            dst_colorspace=Colorspace.ITU709,
+            dst_color_range=ColorRange.MPEG,
+            threads=cv2.getNumThreads(),
+        )
 
     def close(self) -> None:
         """Finish the file."""
@@ -81,6 +106,12 @@ class VideoFile:
             partial.replace(self._path)
         finally:
             partial.unlink(missing_ok=True)
+
+
+def _mark_bt709(codec: VideoCodecContext) -> None:
+    codec.colorspace = Colorspace.ITU709
+    codec.color_range = ColorRange.MPEG
+    codec.color_primaries = codec.color_trc = _BT709
 
 
 def available_encoder() -> str:

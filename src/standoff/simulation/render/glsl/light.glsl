@@ -31,7 +31,7 @@ float sunlit(vec3 offset, vec3 normal) {
     mat2 rotation = mat2(cos(turn), sin(turn), -sin(turn), cos(turn)) * radius;
     float lit = 0.0;
     for (int i = 0; i < 8; i++) lit += texture(shadow_map, vec3(at.xy + rotation * TAPS[i], at.z));
-    return lit / 8.0;
+    return mix(lit / 8.0, 1.0, smoothstep(125.0, 155.0, length(offset)));
 }
 
 vec3 sky_radiance(vec3 direction) {

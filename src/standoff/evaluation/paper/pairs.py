@@ -1,0 +1,137 @@
+"""Distances between workers and machines against exact truth, and against the paper's substitute for it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from standoff.core.classes import CLASSES
+from standoff.core.homography import BoolArray, FloatArray
+from standoff.core.types import TextArray
+from standoff.evaluation.paper.benchmark_polynomial import Benchmark, fit_benchmark
+from standoff.evaluation.paper.clip import Clip
+from standoff.evaluation.paper.metrics import DistanceScore, fill_as_the_filter, score_distances
+from standoff.evaluation.paper.rectified import wrong_frames
+from standoff.evaluation.paper.watch import Watched
+from standoff.stages.proximity import ProximityParams
+
+BEFORE = "before the filter"
+AFTER = "after the filter"
+FILLED = "after, failures filled"
+AGAINST_BENCHMARK = "filled, against benchmark"
+BENCHMARK = "benchmark itself"
+NOT_MEASURED = "no distance of this pair"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PairSeries:
+    """One worker and one machine over the clip, by frame (F).
+
+    Attributes:
+        names: Worker, machine.
+        class_pair: "worker-excavator".
+        truth_m: Exact; NaN where the truth has no such pair.
+        before_m: As measured; NaN where not.
+        after_m: After the outlier filter; NaN where not measured.
+        filled_m: The same with failed rectifications replaced as the paper's filter does.
+        failed: Frames whose rectification failed.
+        reason: Why there is no estimate; empty where there is one.
+        benchmark: The paper's substitute for truth, where it is made.
+    """
+
+    names: tuple[str, str]
+    class_pair: str
+    truth_m: FloatArray
+    before_m: FloatArray
+    after_m: FloatArray
+    filled_m: FloatArray
+    failed: BoolArray
+    reason: TextArray
+    benchmark: Benchmark | None
+
+    def compared(self) -> Mapping[str, tuple[FloatArray, FloatArray]]:
+        """Return, by what is compared, the series that counts as true and the one that is scored."""
+        pairs = {BEFORE: (self.truth_m, self.before_m), AFTER: (self.truth_m, self.after_m)}
+        pairs[FILLED] = (self.truth_m, self.filled_m)
+        if self.benchmark is not None:
+            pairs[AGAINST_BENCHMARK] = (self.benchmark.trend_m, self.filled_m)
+            pairs[BENCHMARK] = (self.truth_m, self.benchmark.trend_m)
+        return pairs
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PairGroup:
+    """All pairs of one kind.
+
+    Attributes:
+        class_pair: "worker-excavator".
+        pairs: How many.
+        scores: By what is compared.
+        missing_by_reason: Frames without an estimate, by cause.
+    """
+
+    class_pair: str
+    pairs: int
+    scores: Mapping[str, DistanceScore]
+    missing_by_reason: Mapping[str, int]
+
+
+def pair_series(clip: Clip, watched: Watched, *, benchmark: bool) -> tuple[PairSeries, ...]:
+    """Take each pair's distances out of what the monitor said."""
+    names = clip.names()
+    no_map = ~np.isfinite(watched.scale_m_per_px)
+    failed = no_map | wrong_frames(watched)
+    return tuple(
+        _one_series(clip, watched, (names[ends[0]], names[ends[1]]), column, failed, no_map, benchmark)
+        for column, ends in enumerate(clip.pairs)
+    )
+
+
+def _one_series(
+    clip: Clip,
+    watched: Watched,
+    names: tuple[str, str],
+    column: int,
+    failed: BoolArray,
+    no_map: BoolArray,
+    benchmark: bool,
+) -> PairSeries:
+    first, second = clip.pairs[column].tolist()
+    before_m = np.linalg.norm(watched.xy_m[:, first] - watched.xy_m[:, second], axis=1)
+    after_m = watched.distance_m[:, column]
+    one, other = watched.reason[:, first], watched.reason[:, second]
+    reason = np.where(one != "", one, other)
+    reason[np.isnan(after_m) & (reason == "")] = NOT_MEASURED
+    raw_m = np.linalg.norm(watched.annotated_m[:, first] - watched.annotated_m[:, second], axis=1)
+    threshold_px = ProximityParams().outlier_threshold_px
+    assert threshold_px is not None
+    return PairSeries(
+        names=names,
+        class_pair="-".join(CLASSES[clip.class_id[end]].name for end in (first, second)),
+        truth_m=clip.distance_m[:, column],
+        before_m=before_m,
+        after_m=after_m,
+        filled_m=fill_as_the_filter(after_m, no_map),
+        failed=failed,
+        reason=reason,
+        benchmark=fit_benchmark(raw_m, threshold_px * watched.scale_m_per_px) if benchmark else None,
+    )
+
+
+def group_pairs(series: tuple[PairSeries, ...]) -> tuple[PairGroup, ...]:
+    """Score all pairs of the same two classes together."""
+    groups = []
+    for class_pair in sorted({one.class_pair for one in series}):
+        own = [one for one in series if one.class_pair == class_pair]
+        compared = [one.compared() for one in own]
+        scores = {
+            name: score_distances(*(np.concatenate([pairs[name][side] for pairs in compared]) for side in (0, 1)))
+            for name in compared[0]
+        }
+        reasons = np.concatenate([one.reason for one in own])
+        missing = dict(Counter(reasons[reasons != ""].tolist()).most_common())
+        groups.append(PairGroup(class_pair, len(own), scores, missing))
+    return tuple(groups)

@@ -1,0 +1,80 @@
+"""How often the reference object was found, and how well: the paper's rectification failures, and section 8.2."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from standoff.core.homography import BoolArray, FloatArray
+from standoff.evaluation.paper.clip import TrueReference
+from standoff.evaluation.paper.watch import WRONG, Watched, is_wrong
+
+
+@dataclass(frozen=True, slots=True)
+class RectificationScore:
+    """What became of the reference object in every frame.
+
+    Attributes:
+        frames: Of the clip.
+        not_visible: Frames without a map in which the reference cannot be seen at all.
+        failed: Frames without a map in which it can be seen, and frames whose map has a corner more than 5 px off,
+            whatever the outlier filter makes of them.
+        wrong: The second kind alone.
+        failed_covered: Failed frames in which something lies on it.
+        failed_by_reason: Their causes.
+        corner_rmse_px: Root mean squared distance of the corners of all other maps; NaN without.
+        worst_corner_px: Largest distance over all maps, wrong ones included; NaN without.
+        within_share: Frames whose four corners are all within 5 px, of the frames in which it can be seen; NaN
+            without.
+        median_s: Of finding the map.
+    """
+
+    frames: int
+    not_visible: int
+    failed: int
+    wrong: int
+    failed_covered: int
+    failed_by_reason: Mapping[str, int]
+    corner_rmse_px: float
+    worst_corner_px: float
+    within_share: float
+    median_s: float
+
+
+def score_rectification(watched: Watched, reference: TrueReference) -> RectificationScore:
+    """Count failures and measure the corners."""
+    error_px = watched.corner_error_px
+    has_map = np.isfinite(watched.scale_m_per_px)
+    wrong = wrong_frames(watched)
+    right = has_map & ~wrong
+    not_visible = ~has_map & (reference.visible_share <= 0.0)
+    failed = wrong | (~has_map & ~not_visible)
+    reasons = np.where(wrong, WRONG, watched.no_map)[failed]
+    looked_for = int((~not_visible).sum())
+    return RectificationScore(
+        frames=len(has_map),
+        not_visible=int(not_visible.sum()),
+        failed=int(failed.sum()),
+        wrong=int(wrong.sum()),
+        failed_covered=int((failed & reference.covered).sum()),
+        failed_by_reason=dict(Counter(reasons.tolist()).most_common()),
+        corner_rmse_px=_root_mean_square(error_px[right]),
+        worst_corner_px=float(np.max(error_px[has_map])) if has_map.any() else float("nan"),
+        within_share=float(right.sum()) / looked_for if looked_for else float("nan"),
+        median_s=float(np.median(watched.ground_s)),
+    )
+
+
+def wrong_frames(watched: Watched) -> BoolArray:
+    """Return (F,) which frames have a map that should not have been believed."""
+    has_map = np.isfinite(watched.scale_m_per_px)
+    return np.array(
+        [mapped and is_wrong(error) for mapped, error in zip(has_map, watched.corner_error_px, strict=True)]
+    )
+
+
+def _root_mean_square(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values**2))) if values.size else float("nan")

@@ -1,0 +1,127 @@
+"""One self-contained page about the paper's tests on one or several clips."""
+
+from __future__ import annotations
+
+import base64
+import math
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import numpy as np
+from markupsafe import Markup
+
+from standoff import __version__
+from standoff.core.errors import OutputError
+from standoff.evaluation.paper.benchmark_polynomial import DEGREE, KEPT_SD, MEDIAN_FRAMES
+from standoff.evaluation.paper.figures import ESTIMATE, RAW, TREND, board_chart, corner_chart, pair_chart
+from standoff.evaluation.paper.pairs import PairSeries
+from standoff.evaluation.paper.rectified import wrong_frames
+from standoff.evaluation.paper.result import ClipResult
+from standoff.evaluation.paper.snapshots import Snapshot
+from standoff.stages.sinks.folder import partial_path
+
+MOST_CHARTS = 4
+_NEAREST_FIRST_M = 1e9
+
+
+def write_report(results: Sequence[ClipResult], path: Path | str) -> None:
+    """Write the page, whole or not at all.
+
+    Args:
+        results: One section each.
+        path: An existing file is replaced.
+
+    Raises:
+        OutputError: The file cannot be written.
+    """
+    path = Path(path)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        partial = partial_path(path)
+        partial.write_text(render(results), encoding="utf-8")
+        partial.replace(path)
+    except OSError as error:
+        found = f"{path}: {error.strerror or error}"
+        raise OutputError(expected="a report to write", found=found, fix="choose another path") from error
+
+
+def render(results: Sequence[ClipResult]) -> str:
+    """Return the page."""
+    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True)
+    environment.filters.update(number=number_text, percent=_percent, picture=_data_uri, words=_words)
+    here, look = files("standoff.evaluation.paper"), files("standoff.stages.sinks")
+    template = environment.from_string((here / "report.html.j2").read_text(encoding="utf-8"))
+    css = (look / "report.css").read_text(encoding="utf-8") + (here / "report.css").read_text(encoding="utf-8")
+    return template.render(
+        version=__version__,
+        written_at=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        css=Markup(css),
+        trial=results[0].trial.describe(),
+        clips=[_section(result) for result in results],
+        colours={"estimate": ESTIMATE, "raw": RAW, "trend": TREND},
+        degree=DEGREE,
+        kept_sd=KEPT_SD,
+        median_frames=MEDIAN_FRAMES,
+    )
+
+
+def _section(result: ClipResult) -> dict[str, Any]:
+    """Return what the template needs for one clip."""
+    watched, snapshots = result.watched, result.watched.snapshots if result.watched else None
+    charted = sorted(result.series, key=_nearest_m)[:MOST_CHARTS]
+    corners = ""
+    if watched is not None:
+        failed = ~np.isfinite(watched.scale_m_per_px) | wrong_frames(watched)
+        corners = corner_chart(watched, failed)
+    return {
+        "name": result.clip.name,
+        "preset": result.clip.preset,
+        "frames": result.clip.frame_count,
+        "size_px": watched.size_px if watched else None,
+        "figures": result.figures(),
+        "rectification": result.rectification,
+        "localisation": result.localisation,
+        "groups": result.groups,
+        "board": result.board,
+        "corner_chart": Markup(corners),
+        "board_chart": Markup(board_chart(result.board) if result.board else ""),
+        "pair_charts": [Markup(pair_chart(series)) for series in charted],
+        "pairs_left_out": len(result.series) - len(charted),
+        "rectified": snapshots.rectified() if snapshots else None,
+        "reference": snapshots.reference() if snapshots else None,
+        "failures": list(snapshots.failures.values()) if snapshots else [],
+    }
+
+
+def _nearest_m(series: PairSeries) -> float:
+    return float(np.nanmin(np.append(series.truth_m, _NEAREST_FIRST_M)))
+
+
+def number_text(value: float, unit: str = "", none: str = "none") -> str:
+    """Return a measured number for people, `none` where nothing was measured.
+
+    >>> number_text(0.3312, "m"), number_text(37, "frames"), number_text(float("nan"), "%")
+    ('0.33 m', '37 frames', 'none')
+    """
+    if not math.isfinite(value):
+        return none
+    digits = 0 if unit == "frames" else 2 if abs(value) >= 0.1 or value == 0 else 3
+    return f"{value:.{digits}f} {unit}".strip()
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.1f} %" if math.isfinite(share) else "none"
+
+
+def _words(value: object) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return str(value).replace("_", " ")
+
+
+def _data_uri(snapshot: Snapshot) -> str:
+    return "data:image/jpeg;base64," + base64.b64encode(snapshot.jpeg).decode("ascii")

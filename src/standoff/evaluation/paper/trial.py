@@ -1,0 +1,131 @@
+"""How the monitor is set up on a clip."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from standoff.config import Settings, build_stage, load_settings
+from standoff.core.errors import DataError
+from standoff.core.protocols import Detector, Tracker
+from standoff.evaluation.paper.clip import Clip
+from standoff.evaluation.paper.truth_detector import REFERENCE_MARGIN_PX, BoxError, TrueBoxes
+from standoff.pipeline import Pipeline
+from standoff.stages.frames import Source
+from standoff.stages.ground.params import ReferenceMethod
+from standoff.stages.locate.params import Anchor, LocateParams
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """What is tried.
+
+    Attributes:
+        method: How the reference's corners are found. With "paper" everything is as printed: the centre of the box,
+            its outlier filter, lens distortion left in the picture. Otherwise the clip's camera file removes it.
+        detector: "truth", "noisy", or a model.
+        anchor: Point of the box that stands for an entity; None: the centre with "paper", standoff's default otherwise.
+        box_error: For "noisy".
+        seed: For "noisy".
+    """
+
+    method: ReferenceMethod = "paper"
+    detector: str | Path = "truth"
+    anchor: Anchor | None = None
+    box_error: BoxError = field(default_factory=BoxError)
+    seed: int = 0
+
+    @property
+    def anchor_used(self) -> Anchor:
+        """The point of the box, decided."""
+        return self.anchor or ("box_centre" if self.method == "paper" else LocateParams().anchor)
+
+    @property
+    def knows_lens(self) -> bool:
+        """Whether lens distortion is removed."""
+        return self.method != "paper"
+
+    def describe(self) -> dict[str, Any]:
+        """Return what was tried, for people and machines."""
+        detector = self.detector if isinstance(self.detector, str) else self.detector.name
+        about: dict[str, Any] = {
+            "method": self.method,
+            "anchor": self.anchor_used,
+            "detector": detector,
+            "lens distortion removed": self.knows_lens,
+            "outlier filter": "paper",
+        }
+        if not isinstance(self.detector, Path):
+            about["reference box drawn wide by, px"] = REFERENCE_MARGIN_PX
+        if self.detector == "noisy":
+            about["box error, px"] = self.box_error.px
+            about["box error, share of the side"] = self.box_error.share
+            about["seed"] = self.seed
+        return about
+
+
+def build_monitor(clip: Clip, trial: Trial, source: Source) -> Pipeline:
+    """Make the monitor for one clip.
+
+    Args:
+        clip: The truth, of which the monitor is shown the reference's shape and what the trial says.
+        trial: What to try.
+        source: The clip's video.
+
+    Raises:
+        DataError: There is no reference object.
+        StandoffError: The model cannot be used, or the clip's own files are broken.
+    """
+    settings = settings_for(clip, trial)
+    detector: Detector
+    tracker: Tracker
+    if settings.model is None:
+        detector = tracker = TrueBoxes(clip, trial.box_error if trial.detector == "noisy" else None, trial.seed)
+    else:
+        detector, tracker = build_stage("detect", settings), build_stage("track", settings)
+        _check_reference_class(detector, settings.model)
+    return Pipeline(
+        frames=source,
+        detector=detector,
+        ground=build_stage("ground", settings),
+        tracker=tracker,
+        locator=build_stage("locate", settings),
+        proximity=build_stage("proximity", settings),
+        hazard=build_stage("hazard", settings),
+    )
+
+
+def settings_for(clip: Clip, trial: Trial) -> Settings:
+    """Return the settings: the clip's own description of its reference, and what the trial changes.
+
+    Raises:
+        DataError: There is no reference object.
+        ConfigError: `reference.yaml` is not a settings file.
+    """
+    if clip.reference is None:
+        raise DataError(
+            expected="a clip with a reference object", found=f"none in {clip.folder}", fix="choose another preset"
+        )
+    detected = dict.fromkeys(("box_px", "box_time_s", "first_corner_px"))
+    ground: dict[str, Any] = {
+        "reference": {"params": {"method": trial.method}, **detected},
+        "camera": str(clip.folder / "camera.yaml") if trial.knows_lens else None,
+    }
+    overrides: dict[str, Any] = {
+        "ground": ground,
+        "locate": {"anchor": trial.anchor_used},
+        "proximity": {"outlier_filter": "paper"},
+        "model": str(trial.detector) if isinstance(trial.detector, Path) else None,
+    }
+    return load_settings(clip.folder / "reference.yaml", overrides)
+
+
+def _check_reference_class(detector: Detector, model: Path) -> None:
+    classes = getattr(detector, "description", {}).get("class_map", {}).values()
+    if "reference" not in classes:
+        raise DataError(
+            expected="a model with a class `reference`, which tells where the reference object is",
+            found=f"{model} without one",
+            fix="use another model, or --detector truth",
+        )

@@ -1,0 +1,226 @@
+"""Run the monitor on a clip and write down, frame by frame, what it said about what is really there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from standoff.core.classes import CLASSES
+from standoff.core.errors import DataError
+from standoff.core.homography import FloatArray
+from standoff.core.types import FrameResult, IntArray, NoGroundMap, TextArray
+from standoff.evaluation.paper.clip import Clip
+from standoff.evaluation.paper.snapshots import Snapshots
+from standoff.evaluation.paper.trial import Trial, build_monitor, settings_for
+from standoff.evaluation.paper.truth_detector import without_reference
+from standoff.evaluation.paper.turning import Turning
+from standoff.evaluation.rectification import FAILURE_PX
+from standoff.stages.frames import Source, open_source
+from standoff.stages.track.association import assign, overlaps
+
+NOT_VISIBLE = "not visible"
+NOT_DETECTED = "not detected"
+WRONG = f"a corner is more than {FAILURE_PX:g} px off"
+MIN_OVERLAP = 0.3
+"""Smallest IoU of a box with the truth's for the two to be the same thing."""
+
+_ROLE = np.array([site_class.role.value for site_class in CLASSES])
+_NOTHING = -1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Watched:
+    """What the monitor said, by frame (F), entity (E) and pair (P) of the clip.
+
+    Attributes:
+        size_px: (width, height) of the pictures.
+        detected_px: (F, E, 4) boxes as detected; NaN where not detected.
+        xy_m: (F, E, 2) positions, site frame; NaN where `reason` says why.
+        reason: (F, E) why there is no position; empty where there is one.
+        annotated_m: (F, E, 2) centres of the true boxes through the frame's own map; NaN without a map.
+        distance_m: (F, P) after the outlier filter; NaN where not measured.
+        no_map: (F,) why there is no map; empty where there is one.
+        scale_m_per_px: (F,) of the map (Eq. 6); NaN without.
+        corner_error_px: (F, 4) of the reference's corners; NaN without a map.
+        ground_s: (F,) seconds spent on finding the map.
+        snapshots: Pictures of some frames.
+    """
+
+    size_px: tuple[int, int]
+    detected_px: FloatArray
+    xy_m: FloatArray
+    reason: TextArray
+    annotated_m: FloatArray
+    distance_m: FloatArray
+    no_map: TextArray
+    scale_m_per_px: FloatArray
+    corner_error_px: FloatArray
+    ground_s: FloatArray
+    snapshots: Snapshots
+
+    @classmethod
+    def blank(cls, clip: Clip, size_px: tuple[int, int]) -> Watched:
+        """Return arrays to be filled in."""
+        frames, entities = clip.box_px.shape[:2]
+        return cls(
+            size_px=size_px,
+            detected_px=np.full((frames, entities, 4), np.nan),
+            xy_m=np.full((frames, entities, 2), np.nan),
+            reason=np.full((frames, entities), "", dtype=object),
+            annotated_m=np.full((frames, entities, 2), np.nan),
+            distance_m=np.full((frames, len(clip.pairs)), np.nan),
+            no_map=np.full(frames, "", dtype=object),
+            scale_m_per_px=np.full(frames, np.nan),
+            corner_error_px=np.full((frames, 4), np.nan),
+            ground_s=np.full(frames, np.nan),
+            snapshots=Snapshots(frames),
+        )
+
+
+def watch(clip: Clip, trial: Trial, on_frame: Callable[[], None] | None = None) -> Watched:
+    """Run the monitor on the clip's video.
+
+    Args:
+        clip: With a reference object.
+        trial: What to try.
+        on_frame: Called after each frame.
+
+    Raises:
+        DataError: There is no reference object, or the video and the truth have different lengths.
+        StandoffError: The video or the model cannot be used.
+    """
+    with open_clip_video(clip) as source:
+        monitor = build_monitor(clip, trial, source)
+        notes = _Notes(clip, trial, source.size_px)
+        with closing(monitor.run()) as results:
+            for result in results:
+                check_frame(clip, result.frame.index)
+                notes.take(result)
+                if on_frame is not None:
+                    on_frame()
+    check_frame(clip, clip.frame_count - 1, seen=notes.taken)
+    return notes.watched
+
+
+def open_clip_video(clip: Clip) -> Source:
+    """Open the clip's video.
+
+    Raises:
+        DataError: It says that it has another number of frames than the truth.
+        SourceError: It cannot be read.
+    """
+    source = open_source(clip.video)
+    if source.frame_count is not None and source.frame_count != clip.frame_count:
+        source.close()
+        raise _length_error(clip, f"{source.frame_count}")
+    return source
+
+
+def check_frame(clip: Clip, index: int, *, seen: int | None = None) -> None:
+    """Raise DataError where the truth has no such frame, or the video ended with another number of frames `seen`."""
+    if index >= clip.frame_count:
+        raise _length_error(clip, f"at least {index + 1}")
+    if seen is not None and seen != clip.frame_count:
+        raise _length_error(clip, f"{seen}")
+
+
+def _length_error(clip: Clip, found: str) -> DataError:
+    return DataError(
+        expected=f"{clip.frame_count} frames in {clip.video}, as many as in its truth",
+        found=found,
+        fix="render the clip again with `standoff simulate`",
+    )
+
+
+class _Notes:
+    """Takes each frame's result and files it under what is really there."""
+
+    def __init__(self, clip: Clip, trial: Trial, size_px: tuple[int, int]) -> None:
+        reference = settings_for(clip, trial).ground.reference
+        assert reference is not None and clip.reference is not None, "checked in settings_for"
+        self.watched = Watched.blank(clip, size_px)
+        self.taken = 0
+        self._clip, self._true_px = clip, clip.reference.corners_px
+        self._turning = Turning(reference.shape(), clip.reference.corners_m)
+        self._true_ids = not isinstance(trial.detector, Path)
+
+    def take(self, result: FrameResult) -> None:
+        frame, watched = result.frame.index, self.watched
+        self.taken += 1
+        watched.ground_s[frame] = result.stage_ms["ground"] / 1e3
+        turn = self._take_map(result)
+        tracks, detections = result.tracks, without_reference(result.detections)
+        if self._true_ids:
+            track_row = detection_row = self._rows_by_id(tracks.track_id)
+        else:
+            track_row = self._rows_by_overlap(frame, tracks.xyxy_px, tracks.class_id)
+            detection_row = self._rows_by_overlap(frame, detections.xyxy_px, detections.class_id)
+        detected, tracked = detection_row != _NOTHING, track_row != _NOTHING
+        watched.detected_px[frame, detected] = detections.xyxy_px[detection_row[detected]]
+        xy_m = self._turning.to_site(result.positions.xy_m[track_row[tracked]], turn)
+        watched.xy_m[frame, tracked] = xy_m
+        watched.reason[frame, tracked] = result.positions.reason[track_row[tracked]]
+        watched.reason[frame, ~tracked] = NOT_DETECTED
+        watched.reason[frame, np.isnan(self._clip.box_px[frame]).any(axis=1)] = NOT_VISIBLE
+        self._take_distances(result, track_row)
+
+    def _take_map(self, result: FrameResult) -> int:
+        """File what is known of the map; return the turn that brings its positions to the site frame."""
+        frame, ground, watched = result.frame.index, result.ground, self.watched
+        true_px = self._true_px[frame]
+        if isinstance(ground, NoGroundMap):
+            watched.no_map[frame] = ground.reason
+            watched.snapshots.take_failure(result.frame, true_px, None, ground.reason)
+            return 0
+        error_px, turn = self._turning.compare(ground.anchors_px, true_px)
+        watched.corner_error_px[frame] = error_px
+        watched.scale_m_per_px[frame] = ground.scale_m_per_px
+        boxes_px = self._clip.box_px[frame]
+        centres_px = (boxes_px[:, :2] + boxes_px[:, 2:]) / 2.0
+        watched.annotated_m[frame] = self._turning.to_site(ground.to_ground(centres_px)[0], turn)
+        if is_wrong(error_px):
+            watched.snapshots.take_failure(result.frame, true_px, ground, WRONG)
+        else:
+            watched.snapshots.take(result.frame, true_px, ground)
+        return turn
+
+    def _take_distances(self, result: FrameResult, track_row: IntArray) -> None:
+        near = result.proximities
+        rows = {pair: k for k, pair in enumerate(zip(near.track_a.tolist(), near.track_b.tolist(), strict=True))}
+        for column, ends in enumerate(self._clip.pairs):
+            if (track_row[ends] != _NOTHING).all():
+                first, second = sorted(result.tracks.track_id[track_row[ends]].tolist())
+                if (first, second) in rows:
+                    self.watched.distance_m[result.frame.index, column] = near.distance_m[rows[first, second]]
+
+    def _rows_by_id(self, track_id: IntArray) -> IntArray:
+        """Return (E,) the row of each entity under its own id, or -1."""
+        row_of = np.full(len(self._clip.entity_id), _NOTHING)
+        row_of[np.searchsorted(self._clip.entity_id, track_id)] = np.arange(len(track_id))
+        return row_of
+
+    def _rows_by_overlap(self, frame: int, boxes_px: FloatArray, class_id: IntArray) -> IntArray:
+        """Return (E,) the row of the box that covers each visible entity, or -1."""
+        row_of = np.full(len(self._clip.entity_id), _NOTHING)
+        visible = np.flatnonzero(np.isfinite(self._clip.box_px[frame]).all(axis=1))
+        similarity = overlaps(self._clip.box_px[frame, visible], boxes_px)
+        similarity *= _ROLE[self._clip.class_id[visible]][:, None] == _ROLE[class_id]
+        first, second = assign(similarity, MIN_OVERLAP)
+        row_of[visible[first]] = second
+        return row_of
+
+
+def is_wrong(corner_error_px: FloatArray) -> bool:
+    """Tell whether an outline that was believed should not have been.
+
+    Args:
+        corner_error_px: (4,); NaN counts as wrong.
+
+    >>> is_wrong(np.array([0.1, 0.2, 5.5, 0.3]))
+    True
+    """
+    return not bool((corner_error_px <= FAILURE_PX).all())

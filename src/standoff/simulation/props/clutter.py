@@ -1,0 +1,10 @@
+"""All families of clutter, small and large, that a site is strewn with."""
+
+from standoff.simulation.props.concrete_works import CONCRETE_WORKS
+from standoff.simulation.props.debris import DEBRIS
+from standoff.simulation.props.heaps import HEAPS
+from standoff.simulation.props.prop import Prop
+from standoff.simulation.props.stacks import STACKS
+from standoff.simulation.props.tools import TOOLS
+
+CLUTTER: tuple[Prop, ...] = CONCRETE_WORKS + STACKS + HEAPS + DEBRIS + TOOLS

@@ -1,0 +1,86 @@
+"""The colour pass: everything that the pinhole camera sees, lit, in linear light."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from standoff.simulation.render.context import build_program, set_uniforms
+from standoff.simulation.render.frustum import Frustum
+from standoff.simulation.render.geometry import Arena, InstanceDrawer, Instances
+from standoff.simulation.render.noise import make_noise
+from standoff.simulation.render.relief import Relief, upload_with_mipmaps
+from standoff.simulation.render.shadow import ShadowMap, SunBox
+from standoff.simulation.render.surfaces import surface_table
+from standoff.simulation.render.targets import OPENNESS_STEP_PX, Targets
+from standoff.simulation.scene import Light
+
+_UNITS = {"shadow_map": 0, "shadow_depth": 1, "openness": 2, "noise": 3, "picture": 4}
+
+
+class ColourPass:
+    """Draws things, ground and sky with several samples a pixel."""
+
+    def __init__(self, context: Any) -> None:  # noqa: ANN401
+        self._context = context
+        lit = "light.glsl"
+        self._things = InstanceDrawer(context, build_program(context, ("instances.vert",), (lit, "instances.frag")))
+        self._ground = build_program(context, ("ground.vert",), (lit, "ground.frag"))
+        self._sky = context.vertex_array(build_program(context, ("fullscreen.vert",), (lit, "sky.frag")), [])
+        self._noise = upload_with_mipmaps(context, make_noise())
+        set_uniforms(self._things.program, {"surfaces": surface_table()})
+
+    def draw(
+        self, targets: Targets, frustum: Frustum, visible: Instances, arena: Arena, relief: Relief, shadow: ShadowMap,
+        sun: dict[str, object],
+    ) -> None:  # fmt: skip
+        """Fill `targets.colour`; `sun` are the uniforms of `sun_uniforms`."""
+        context = self._context
+        context.enable_only(context.DEPTH_TEST)
+        targets.colour_pass.use()
+        targets.colour_pass.clear(depth=1.0)
+        shadow.use(_UNITS["shadow_map"], _UNITS["shadow_depth"])
+        targets.smooth.use(_UNITS["openness"])
+        self._noise.use(_UNITS["noise"])
+        relief.picture.use(_UNITS["picture"])
+        pixel_to_ray = np.linalg.inv(frustum.view.camera.matrix @ frustum.view.site_to_camera)
+        values = {
+            **sun,
+            **relief.uniforms,
+            **_UNITS,
+            "clip_from_offset": frustum.clip_from_offset(),
+            "origin": tuple(frustum.view.position_m.tolist()),
+            "offset_from_pixel": pixel_to_ray @ frustum.undistorted_from_drawn(),
+            "openness_scale": tuple(1.0 / (OPENNESS_STEP_PX * length) for length in targets.small_px),
+        }
+        for program in (self._things.program, self._ground, self._sky.program):
+            set_uniforms(program, values)
+        self._things.draw(visible, arena)
+        relief.draw(self._ground, frustum)
+        context.depth_func = "<="
+        self._sky.render(vertices=3)
+        context.depth_func = "<"
+        shadow.unuse(_UNITS["shadow_map"], _UNITS["shadow_depth"])
+        context.copy_framebuffer(targets.resolved, targets.colour_pass)
+
+
+def sun_uniforms(light: Light, box: SunBox, shadow: ShadowMap, frustum: Frustum) -> dict[str, object]:
+    """Return what light.glsl needs to know about sun, sky and shadow."""
+    to_texture = np.diag([0.5, 0.5, 0.5, 1.0])
+    to_texture[:3, 3] = 0.5
+    from_offset = np.eye(4)
+    from_offset[:3, 3] = frustum.view.position_m
+    size_m = box.high_m - box.low_m
+    texel_m = float(size_m[:2].max()) / shadow.size_px
+    radius_texels = 0.5 * light.sun_softness_m_per_m * float(size_m[2]) / texel_m
+    return {
+        "to_sun": tuple(np.asarray(light.to_sun, dtype=float).tolist()),
+        "sun": light.sun,
+        "sky": light.sky,
+        "bounce": light.bounce,
+        "haze_colour": light.haze,
+        "haze_per_m": light.haze_per_m,
+        "shadow_from_offset": to_texture @ box.clip_from_site() @ from_offset,
+        "shadow_scale": (texel_m, radius_texels, 1.0 / float(size_m[2]), 1.0 / shadow.size_px),
+    }

@@ -1,0 +1,98 @@
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from standoff.core import homography
+from standoff.core.camera import Camera
+from standoff.core.homography import FloatArray
+from standoff.core.pose import View
+from tolerances import DISTORTION_PX, GEOMETRY_REL
+
+_CAMERA = Camera(
+    1920,
+    1080,
+    np.array([[1400.0, 0.0, 965.0], [0.0, 1390.0, 533.0], [0.0, 0.0, 1.0]]),
+    np.array([-0.1, 0.02, 1e-3, -5e-4, 0.0]),
+)
+
+
+def _view(seed: int, camera: Camera = _CAMERA) -> View:
+    rng = np.random.default_rng(seed)
+    return View.aimed(
+        camera,
+        rng.uniform([-30, -30, 15], [30, 30, 60]),
+        heading_deg=float(rng.uniform(0, 360)),
+        pitch_deg=float(rng.uniform(30, 90)),
+        roll_deg=float(rng.uniform(-5, 5)),
+    )
+
+
+def _points_in_view(view: View, seed: int) -> FloatArray:
+    rng = np.random.default_rng(seed)
+    height_m = float(rng.uniform(0, 3))
+    xy_m = view.to_plane(rng.uniform([0, 300], [1919, 1079], (40, 2)), height_m)
+    return np.column_stack([xy_m, np.full(len(xy_m), height_m)])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_projection_agrees_with_opencv(seed: int) -> None:
+    view = _view(seed)
+    points_m = _points_in_view(view, seed)
+    rotation, _ = cv2.Rodrigues(view.site_to_camera)
+    shift_m = -view.site_to_camera @ view.position_m
+    expected_px, _ = cv2.projectPoints(points_m, rotation, shift_m, _CAMERA.matrix, _CAMERA.distortion)
+    np.testing.assert_allclose(view.project(points_m), expected_px[:, 0], atol=DISTORTION_PX)
+
+
+@given(st.integers(0, 10_000))
+def test_a_pixel_goes_to_the_plane_and_back(seed: int) -> None:
+    view = _view(seed)
+    rng = np.random.default_rng(seed)
+    pixels = rng.uniform([0, 300], [1919, 1079], (20, 2))
+    height_m = float(rng.uniform(0, 3))
+    xy_m = view.to_plane(pixels, height_m)
+    there = np.isfinite(xy_m).all(axis=1)
+    assert there.any()
+    back_px = view.project(np.column_stack([xy_m, np.full(20, height_m)]))
+    np.testing.assert_allclose(back_px[there], pixels[there], atol=DISTORTION_PX)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_homography_of_a_plane_is_the_projection_of_its_points(seed: int) -> None:
+    view = _view(seed)
+    points_m = _points_in_view(view, seed)
+    mapped_px, valid = homography.apply(view.plane_to_pinhole(float(points_m[0, 2])), points_m[:, :2])
+    assert valid.all()
+    np.testing.assert_allclose(mapped_px, view.project_pinhole(points_m), rtol=GEOMETRY_REL)
+
+
+def test_what_is_behind_the_camera_is_not_in_the_picture() -> None:
+    view = View.aimed(_CAMERA, np.array([0.0, 0.0, 20.0]), heading_deg=0.0, pitch_deg=30.0)
+    assert np.isnan(view.project(np.array([[0.0, -60.0, 20.0]]))).all()
+    assert np.isfinite(view.project(np.array([[0.0, 40.0, 0.0]]))).all()
+
+
+def test_a_ray_above_the_horizon_meets_no_ground() -> None:
+    view = View.aimed(_CAMERA, np.array([0.0, 0.0, 20.0]), heading_deg=0.0, pitch_deg=10.0)
+    assert np.isnan(view.to_plane(np.array([[960.0, 20.0]]))).all()
+
+
+def test_heading_pitch_and_roll_turn_the_way_their_names_say() -> None:
+    level = View.aimed(_CAMERA, np.array([0.0, 0.0, 20.0]), heading_deg=90.0, pitch_deg=45.0)
+    ahead_px, right_px = level.project(np.array([[25.0, 0.0, 0.0], [20.0, -3.0, 0.0]]))
+    centre_px = level.project(np.array([[20.0, 0.0, 0.0]]))[0]
+    assert ahead_px[1] < centre_px[1]  # east is up in the picture when the camera heads east
+    assert right_px[0] > centre_px[0]  # and south is to the right
+    rolled = View.aimed(_CAMERA, np.array([0.0, 0.0, 20.0]), heading_deg=90.0, pitch_deg=45.0, roll_deg=10.0)
+    assert rolled.project(np.array([[20.0, -3.0, 0.0]]))[0, 1] < right_px[1]  # camera's right side down: scene tilts up
+
+
+def test_a_matrix_that_is_no_rotation_is_refused() -> None:
+    with pytest.raises(ValueError, match="rotation"):
+        View(_CAMERA, np.zeros(3), np.diag([1.0, 1.0, -1.0]))
+    with pytest.raises(ValueError, match=r"\(3,\)"):
+        View(_CAMERA, np.zeros(2), np.eye(3))

@@ -1,0 +1,51 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from standoff.core.errors import OutputError
+from standoff.simulation.output import whole_folder
+
+
+def test_a_folder_appears_when_the_block_has_ended(tmp_path: Path) -> None:
+    out = tmp_path / "deep" / "clip"
+    with whole_folder(out, overwrite=False) as folder:
+        (folder / "a.txt").write_text("a")
+        assert not out.exists()
+    assert (out / "a.txt").read_text() == "a"
+    assert [path.name for path in out.parent.iterdir()] == ["clip"]
+
+
+def test_an_interrupted_block_leaves_nothing(tmp_path: Path) -> None:
+    with pytest.raises(KeyboardInterrupt), whole_folder(tmp_path / "clip", overwrite=False) as folder:
+        (folder / "a.txt").write_text("a")
+        raise KeyboardInterrupt
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_interrupted_block_keeps_what_was_there_before(tmp_path: Path) -> None:
+    (tmp_path / "clip").mkdir()
+    (tmp_path / "clip" / "old.txt").write_text("old")
+    with pytest.raises(KeyboardInterrupt), whole_folder(tmp_path / "clip", overwrite=True):
+        raise KeyboardInterrupt
+    assert (tmp_path / "clip" / "old.txt").read_text() == "old"
+
+
+def test_what_a_killed_run_left_is_replaced(tmp_path: Path) -> None:
+    (tmp_path / ".clip.partial").mkdir()
+    (tmp_path / ".clip.partial" / "rest.txt").write_text("rest")
+    with whole_folder(tmp_path / "clip", overwrite=False):
+        pass
+    assert list((tmp_path / "clip").iterdir()) == []
+
+
+def test_a_used_folder_a_file_and_a_forbidden_place_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "used").mkdir()
+    (tmp_path / "used" / "a.txt").write_text("a")
+    with pytest.raises(OutputError, match="overwrite"), whole_folder(tmp_path / "used", overwrite=False):
+        pass
+    with pytest.raises(OutputError, match="the file"), whole_folder(tmp_path / "used" / "a.txt", overwrite=True):
+        pass
+    with pytest.raises(OutputError, match="written to"), whole_folder(tmp_path / "used" / "a.txt" / "b", overwrite=True):
+        pass
