@@ -71,4 +71,9 @@ HULL_BOX_PX = 0.02
 """The box of a convex hull's vertices through a lens against that of all vertices: the lens bends straight lines."""
 
 FOOT_ON_GROUND_M = 0.02
-"""The lowest vertex of a walker against the ground: the sole rolls on corners of its mesh, toes point a little outwards."""
+"""The lowest vertex of a person against the ground: the sole rests exactly, a knee may dip in far postures."""
+
+RENDERED_EDGE_PX = {"pinhole": 0.05, "lens": 0.75, "shaded": 0.15}
+"""Rendered outlines against projected corners. Pinhole: positions are snapped to 1/256 px. Lens: each pixel takes the id
+of the nearest centre of the pinhole picture, at most half a diagonal away. Shaded: four samples a pixel, an 8-bit edge in
+the tone curve's bend and a grainy ground beside it."""

@@ -34,6 +34,7 @@ def _body(entity_id: int, class_id: int, x_m: float, y_m: float, tip_m: tuple[fl
         entity_id,
         class_id,
         (place(box((2.0, 1.0, 1.0), srgb("#808080")), translation(x_m, y_m, 0.0), entity_id=entity_id),),
+        (),
         np.array([x_m, y_m, 0.0]),
         0.0,
         np.array([1.0, 0.0]),

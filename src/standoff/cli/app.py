@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from standoff import __version__
-from standoff.cli import bench, calibrate, config, doctor, evaluate, export, run
+from standoff.cli import bench, calibrate, config, doctor, evaluate, export, run, simulate
 from standoff.core.errors import StandoffError
 
 app = typer.Typer(
@@ -24,6 +24,7 @@ app.command("export")(export.export)
 app.command("calibrate")(calibrate.calibrate)
 app.add_typer(evaluate.app, name="evaluate")
 app.add_typer(config.app, name="config")
+app.add_typer(simulate.app, name="simulate")
 app.command("bench")(bench.bench)
 app.command("doctor")(doctor.doctor)
 

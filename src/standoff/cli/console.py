@@ -55,7 +55,7 @@ def print_table(
         console.print(caption)
 
 
-def progress_bar(*, quiet: bool) -> Progress:
+def progress_bar(*, quiet: bool, unit: str = "frames") -> Progress:
     """Return a progress bar on standard error with rate and time left; silent when quiet or not a terminal."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
@@ -64,7 +64,7 @@ def progress_bar(*, quiet: bool) -> Progress:
         TextColumn("{task.description}"),
         BarColumn(),
         MofNCompleteColumn(),
-        TextColumn("frames  {task.fields[rate]:.1f} a second"),
+        TextColumn(unit + "  {task.fields[rate]:.1f} a second"),
         TimeRemainingColumn(),
         console=Console(stderr=True),
         disable=quiet or not sys.stderr.isatty(),

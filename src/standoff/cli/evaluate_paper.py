@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 Method = Literal["paper", "paper+tls", "oriented"]
 Anchor = Literal["bottom_centre", "box_centre"]
+Boxes = Literal["truth", "noisy"]
 
 
 def paper(
@@ -72,9 +73,11 @@ def paper(
     _tell(results, json_file)
 
 
-def _detector(text: str) -> str | Path:
-    if text in ("truth", "noisy"):
-        return text
+def _detector(text: str) -> Boxes | Path:
+    if text == "truth":
+        return "truth"
+    if text == "noisy":
+        return "noisy"
     if not Path(text).is_file():
         raise ConfigError(
             expected="--detector truth, noisy, or a model file", found=repr(text), fix="check the word or the path"

@@ -2,21 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
-from collections.abc import Generator
 from pathlib import Path
-from typing import Annotated, Literal
+from time import monotonic
+from typing import Annotated, Any, Literal
 
 import typer
+from typer.core import TyperGroup
 
 from standoff.cli.numbers import two_integers
 from standoff.simulation.presets import MAX_SEED, PRESETS
 
+
+class _Presets(TyperGroup):
+    """Commands whose unknown names are unknown presets."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:  # noqa: ANN401 - typer has its own click
+        from standoff.simulation.presets import plan_clip
+
+        if args[0] not in self.commands and not args[0].startswith("-"):
+            plan_clip(args[0])
+        return super().resolve_command(ctx, args)
+
+
 app = typer.Typer(
-    help="Render a construction site whose every position, box and pixel is known.", invoke_without_command=True
+    cls=_Presets,
+    help="Render a construction site whose every position, box and pixel is known.",
+    invoke_without_command=True,
 )
-_Out = Annotated[Path, typer.Option("--out", "-o", help="Folder for the files; appears when all is done.", show_default=False)]
+_Out = Annotated[
+    Path, typer.Option("--out", "-o", help="Folder for the files; appears when all is done.", show_default=False)
+]
 _Seed = Annotated[int, typer.Option(help=f"Of everything random, 0 to {MAX_SEED}; the same seed gives the same truth.")]
 _Processes = Annotated[int, typer.Option(min=1, help="That render side by side; the result does not depend on it.")]
 _Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace the folder if it exists.")]
@@ -32,10 +49,11 @@ def _presets(
 
     if wanted:
         rows = [
-            (name, f"{preset.width_px}x{preset.height_px}", str(preset.frames), preset.summary)
+            (name, preset.summary, f"{preset.width_px}x{preset.height_px}", str(preset.frames))
             for name, preset in PRESETS.items()
         ]
-        print_table("standoff simulate PRESET --out DIR", ("preset", "size", "frames", "what it shows"), rows)
+        columns = ("preset", "what it shows", "size", "frames")
+        print_table("standoff simulate PRESET --out DIR", columns, rows, texts=2)
     elif context.invoked_subcommand is None:
         typer.echo(context.get_help())
 
@@ -82,7 +100,7 @@ for _name in PRESETS:
 def dataset(
     out: _Out,
     images: Annotated[int, typer.Option(min=1, help="How many in all.", show_default=False)],
-    per_scene: Annotated[int, typer.Option(min=1, help="Pictures of each scene, from different places and times.")] = 10,
+    per_scene: Annotated[int, typer.Option(min=1, help="Pictures of each scene, all different.")] = 10,
     size: Annotated[str, typer.Option(help="Of the pictures, WIDTHxHEIGHT px.")] = "1280x720",
     layout: Annotated[Literal["yolo", "coco"], typer.Option(help="Of the annotations.")] = "yolo",
     held_out: Annotated[float, typer.Option(min=0, max=0.5, help="Share of scenes for each of val and test.")] = 0.1,
@@ -102,7 +120,7 @@ def dataset(
         images=images, per_scene=per_scene, width_px=width_px or 0, height_px=height_px or 0, layout=layout,
         held_out=held_out, seed=seed, excavator_mesh=excavator_mesh,
     )  # fmt: skip
-    with _progress("rendering pictures", images, quiet=quiet) as step:
+    with _progress("rendering", images, quiet=quiet, unit="pictures") as step:
         record_dataset(plan, out, overwrite=overwrite, processes=processes, on_picture=step)
     typer.echo(f"{images} pictures in {out}")
 
@@ -115,9 +133,15 @@ def parse_size(size: str | None) -> tuple[int | None, int | None]:
 
 
 @contextmanager
-def _progress(what: str, total: int, *, quiet: bool) -> Generator[Callable[[], None], None, None]:
+def _progress(what: str, total: int, *, quiet: bool, unit: str = "frames") -> Generator[Callable[[], None], None, None]:
     from standoff.cli.console import progress_bar
 
-    with progress_bar(quiet=quiet) as bar:
-        task = bar.add_task(what, total=total)
-        yield lambda: bar.advance(task)
+    with progress_bar(quiet=quiet, unit=unit) as bar:
+        task = bar.add_task(what, total=total, rate=0.0)
+        started = monotonic()
+
+        def step() -> None:
+            done = bar.tasks[task].completed + 1
+            bar.update(task, completed=done, rate=done / (monotonic() - started))
+
+        yield step

@@ -1,4 +1,4 @@
-"""Buildings beyond the fence: walls with grids of windows, flat or pitched roofs, sheds, a facade behind scaffolding."""
+"""Buildings beyond the fence: grids of windows, flat or pitched roofs, sheds, a facade behind scaffolding."""
 
 from __future__ import annotations
 
@@ -41,13 +41,22 @@ class House:
 
 
 FLATS = (
-    House((8, 4), 5), House((12, 4), 6, window=(0.45, 0.5)), House((6, 5), 9, 3.2), House((10, 4), 4, 3.4, 3.2, (0.7, 0.55)),
-    House((7, 5), 7, 3.6, 3.3, (0.9, 0.6)), House((14, 4), 3, 2.8, 3.1),
-)  # fmt: skip
+    House((8, 4), 5),
+    House((12, 4), 6, window=(0.45, 0.5)),
+    House((6, 5), 9, 3.2),
+    House((10, 4), 4, 3.4, 3.2, (0.7, 0.55)),
+    House((7, 5), 7, 3.6, 3.3, (0.9, 0.6)),
+    House((14, 4), 3, 2.8, 3.1),
+)
 COTTAGES = (House((4, 3), 2, gabled=True), House((5, 3), 2, 2.8, 2.8, (0.4, 0.45), True), House((3, 3), 3, gabled=True))
-SHEDS = (House((6, 4), 1, 6.0, 7.0, (0.25, 0.12)), House((9, 5), 1, 6.0, 9.0, (0.6, 0.08)), House((4, 3), 1, 5.0, 6.0, (0.3, 0.2), True))
+SHEDS = (
+    House((6, 4), 1, 6.0, 7.0, (0.25, 0.12)),
+    House((9, 5), 1, 6.0, 9.0, (0.6, 0.08)),
+    House((4, 3), 1, 5.0, 6.0, (0.3, 0.2), True),
+)
 WALLS = tuple(
-    srgb(code) for code in ("#c9c0ae", "#b8a78c", "#d4cfc4", "#a58a70", "#9a9690", "#bfae97", "#8f5f4b", "#c4b9a6", "#8d939a")
+    srgb(code)
+    for code in ("#c9c0ae", "#b8a78c", "#d4cfc4", "#a58a70", "#9a9690", "#bfae97", "#8f5f4b", "#c4b9a6", "#8d939a")
 )
 """Tints of walls: render, brick, panels."""
 
@@ -77,14 +86,14 @@ def _facade(rng: np.random.Generator, house: House, wide_m: float, bays: int) ->
     column, floor = (grid.ravel() for grid in np.meshgrid(np.arange(columns), np.arange(house.floors)))
     glass_m = pitch_m * (share_x if house.detailed else 0.9)
     left = np.column_stack([-wide_m / 2 + (column + 0.5) * pitch_m - glass_m / 2, np.full(len(column), -0.05)])
-    low = floor * house.floor_m + 0.5 * (1.0 - share_z) * house.floor_m + 0.3
+    low = np.asarray((floor + 0.5 - 0.5 * share_z) * house.floor_m + 0.3, np.float64)
     high = low + share_z * house.floor_m
     width = np.column_stack([np.full(len(column), glass_m), np.zeros(len(column))])
     tone = rng.choice([0.03, 0.05, 0.09, 0.3], size=len(column), p=[0.4, 0.3, 0.2, 0.1])
     glass = tone[:, None] * np.array([0.9, 1.0, 1.1]) * rng.uniform(0.8, 1.2, (len(column), 1))
     parts.append(panels(upright(left, width, low, high), glass, Surface.GLASS))
     if house.detailed:
-        frame = upright(left - (0.12, -0.02), width + (0.24, 0.0), low - 0.14, high + 0.1)
+        frame = upright(left - np.array([0.12, -0.02]), width + np.array([0.24, 0.0]), low - 0.14, high + 0.1)
         parts.append(panels(frame, (0.55, 0.54, 0.5), Surface.PLASTIC, tintable=0.3))
     return join(parts)
 
@@ -111,8 +120,18 @@ def _gable(length_m: float, depth_m: float, height_m: float) -> Mesh:
     x, y, eaves, ridge = length_m / 2, depth_m / 2, height_m, height_m + 0.36 * depth_m
     over = 0.5
     slopes = [
-        [[-x - over, -y - over, eaves - 0.3], [x + over, -y - over, eaves - 0.3], [x + over, 0, ridge], [-x - over, 0, ridge]],
-        [[x + over, y + over, eaves - 0.3], [-x - over, y + over, eaves - 0.3], [-x - over, 0, ridge], [x + over, 0, ridge]],
+        [
+            [-x - over, -y - over, eaves - 0.3],
+            [x + over, -y - over, eaves - 0.3],
+            [x + over, 0, ridge],
+            [-x - over, 0, ridge],
+        ],
+        [
+            [x + over, y + over, eaves - 0.3],
+            [-x - over, y + over, eaves - 0.3],
+            [-x - over, 0, ridge],
+            [x + over, 0, ridge],
+        ],
     ]
     gables = [
         [[x, -y, eaves], [x, y, eaves], [x, 0, ridge - 0.1], [x, 0, ridge - 0.1]],

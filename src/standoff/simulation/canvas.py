@@ -50,7 +50,7 @@ class Canvas:
         """Return (N, 2) fixed-point pixels for OpenCV's drawing with `shift=4`."""
         middle = np.array([self.width_px, self.height_px]) / 2 - 0.5
         placed = (np.asarray(points_m) * self.px_per_m + middle) * 2**_FRACTION_BITS
-        return np.round(placed).astype(np.int32)
+        return np.asarray(np.round(placed), np.int32)
 
     def draw(self, layer: npt.NDArray[np.uint8], lines_m: Sequence[FloatArray], value: int, width_m: float) -> None:
         """Draw polylines (each (N, 2), metres) with soft edges."""

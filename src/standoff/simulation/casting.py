@@ -74,8 +74,8 @@ class Cast:
     """
 
     actors: list[Actor] = field(default_factory=list)
-    machines_way: list[shapely.Polygon] = field(default_factory=list)
-    peoples_way: list[shapely.Polygon] = field(default_factory=list)
+    machines_way: list[shapely.Geometry] = field(default_factory=list)
+    peoples_way: list[shapely.Geometry] = field(default_factory=list)
 
     def add(self, models: Sequence[Model], motions: Sequence[Motion], *, force: bool = False) -> bool:
         """Add entities that act together, if nobody else is in their way.
@@ -100,7 +100,8 @@ class Cast:
     @property
     def ways(self) -> list[shapely.Polygon]:
         """Return all ground that actors need, with room around."""
-        return [way.buffer(_PROPS_AWAY_M) for way in (*self.machines_way, *self.peoples_way)]
+        rooms = [way.buffer(_PROPS_AWAY_M) for way in (*self.machines_way, *self.peoples_way)]
+        return list(shapely.get_parts(rooms))
 
 
 def is_person(model: Model) -> bool:
@@ -108,14 +109,17 @@ def is_person(model: Model) -> bool:
     return model.class_id == 0
 
 
-def swept(model: Model, motion: Motion) -> shapely.Polygon:
-    """Return all ground that an entity's footprint and tool pass over, as one convex outline for each half second."""
+def swept(model: Model, motion: Motion) -> shapely.Geometry:
+    """Return all ground that an entity's footprint and tool pass over."""
     shapes: list[shapely.Geometry] = []
+    before: shapely.Polygon | None = None
     for time_s in np.arange(0.0, motion.time_s[-1] + _SWEEP_STEP_S, _SWEEP_STEP_S):
         placement = sample(motion, float(time_s))
         cosine, sine = np.cos(placement.heading_rad), np.sin(placement.heading_rad)
         turn = np.array([[cosine, -sine], [sine, cosine]])
-        shapes.append(shapely.Polygon(model.footprint_m @ turn.T + placement.xy_m))
+        outline = shapely.Polygon(model.footprint_m @ turn.T + placement.xy_m)
+        shapes.append(shapely.union(before or outline, outline).convex_hull)
+        before = outline
         tip_m = model.tool_tip_m(placement.joints)
         if tip_m is not None:
             shapes.append(shapely.Point(turn @ tip_m[:2] + placement.xy_m).buffer(_TOOL_RADIUS_M, quad_segs=3))
@@ -225,25 +229,35 @@ def _machine_activity(rng: np.random.Generator, stage: Stage, left: int, workers
 
 def _lone_machine(rng: np.random.Generator, stage: Stage, kind: str, place: Place) -> _Activity:
     lasting_s, length_m = stage.duration_s, float(rng.uniform(10.0, 18.0))
+    machine: Model
     if kind == "spread":
         machine = make_wheel_loader(rng) if rng.random() < 0.5 else make_dump_truck(rng)
-        return [machine], [behaviour.spreading(rng, machine, place, length_m, lasting_s)]
-    if kind == "roll":
+        motion = behaviour.spreading(rng, machine, place, length_m, lasting_s)
+    elif kind == "roll":
         machine = make_roller(rng)
-        return [machine], [behaviour.rolling(rng, machine, place, length_m, lasting_s)]
-    if kind == "doze":
+        motion = behaviour.rolling(rng, machine, place, length_m, lasting_s)
+    elif kind == "doze":
         machine = make_dozer(rng)
-        return [machine], [behaviour.dozing(rng, machine, place, length_m, lasting_s)]
-    if kind == "drive":
+        motion = behaviour.dozing(rng, machine, place, length_m, lasting_s)
+    elif kind == "drive":
         machine = make_vehicle(rng) if rng.random() < 0.6 else make_dump_truck(rng)
         end = place.moved(float(rng.uniform(25.0, 40.0)), float(rng.normal(0.0, 4.0)), float(rng.normal(0.0, 0.3)))
-        return [machine], [behaviour.driving_through(rng, machine, place, end, lasting_s)]
-    makers = (stage.excavator, make_wheel_loader, make_dump_truck, make_roller, make_dozer, make_vehicle, make_vehicle)
-    machine = makers[int(rng.integers(len(makers)))](rng)
-    return [machine], [behaviour.idle(rng, machine, place, lasting_s)]
+        motion = behaviour.driving_through(rng, machine, place, end, lasting_s)
+    else:
+        machine = _any_machine(rng, stage)
+        motion = behaviour.idle(rng, machine, place, lasting_s)
+    return [machine], [motion]
+
+
+def _any_machine(rng: np.random.Generator, stage: Stage) -> Model:
+    makers: tuple[Callable[[np.random.Generator], Model], ...] = (
+        stage.excavator, make_wheel_loader, make_dump_truck, make_roller, make_dozer, make_vehicle, make_vehicle
+    )  # fmt: skip
+    return makers[int(rng.integers(len(makers)))](rng)
 
 
 def _driving_machine(rng: np.random.Generator) -> Model:
+    makers: tuple[Callable[[np.random.Generator], Model], ...]
     makers = (make_wheel_loader, make_dump_truck, make_roller, make_dozer)
     return makers[int(rng.integers(len(makers)))](rng)
 
@@ -276,12 +290,20 @@ def _near_somebody(rng: np.random.Generator, stage: Stage, cast: Cast) -> Place:
     return Place(float(beside[0]), float(beside[1]), float(rng.uniform(0.0, 2 * np.pi)))
 
 
+def _any_number(rng: np.random.Generator, stage: Stage) -> Cast:
+    """Few or many: now and then an empty site, so that a picture without people is nothing unusual."""
+    if rng.random() < 0.05:
+        return Cast()
+    return crowd(rng, stage, workers=int(rng.integers(1, 13)), machines=int(rng.integers(0, 7)))
+
+
 CASTS: Mapping[str, Callable[[np.random.Generator, Stage], Cast]] = MappingProxyType(
     {
         "mobile": _mobile,
         "stationary-15": partial(_stationary, distance_m=15.0),
         "stationary-20": partial(_stationary, distance_m=20.0),
         "board": _nobody,
+        "random": _any_number,
         "busy": partial(crowd, workers=_BUSY_WORKERS, machines=_BUSY_MACHINES),
     }
 )

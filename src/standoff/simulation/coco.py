@@ -21,7 +21,9 @@ class Annotations:
         self._images: list[dict[str, Any]] = []
         self._annotations: list[dict[str, Any]] = []
 
-    def add(self, image: dict[str, Any], entities: Sequence[Row], size_px: tuple[int, int], ids: IdArray | None) -> None:
+    def add(
+        self, image: dict[str, Any], entities: Sequence[Row], size_px: tuple[int, int], ids: IdArray | None
+    ) -> None:
         """Add a picture.
 
         Args:

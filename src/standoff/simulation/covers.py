@@ -129,7 +129,7 @@ def _make_tarpaulin(rng: np.random.Generator, bed: _Bed) -> Laid:
     turn = rotation("z", rng.uniform(0.0, 360.0))[:2, :2]
     axis = np.linspace(-1.0, 1.0, 25)
     xy = np.stack(np.meshgrid(axis * half_m[0], axis * half_m[1], indexing="ij"), axis=-1) @ turn.T
-    drop_m = 2.5 * np.maximum(bed.outside_m(xy + spot_m) - 0.08, 0.0)
+    drop_m = 2.5 * np.maximum(bed.outside_m(xy + spot_m) - 0.15, 0.0)
     wrinkles_m = 0.02 * np.maximum(ripples(rng, xy, 0.8, 3) + 0.5, 0.0)
     z = np.maximum(bed.height_m + 0.015 - drop_m, 0.015) + wrinkles_m
     return spot_m, relief(np.concatenate([xy, z[..., None]], axis=-1), None, Surface.PLASTIC), _TARPAULINS

@@ -3,30 +3,33 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 import cv2
 import numpy as np
 import yaml
 
 from standoff.core.classes import CLASSES
-from standoff.simulation.casting import random_plan
 from standoff.simulation.coco import Annotations
+from standoff.simulation.covers import COVER_KINDS
 from standoff.simulation.crew import work_through
 from standoff.simulation.flight import Still, drone_camera
 from standoff.simulation.moment import scene_at
 from standoff.simulation.output import whole_folder
-from standoff.simulation.presets import check_seed, check_size
+from standoff.simulation.presets import MAX_SEED, Condition, CoverPlan, Plan, Preset, check_seed, check_size
 from standoff.simulation.site import Site, build_site
+from standoff.simulation.site_plans import SiteStyle
 from standoff.simulation.studio import Studio
 from standoff.simulation.truth import Row
 
 SPLITS = ("train", "val", "test")
+_SCENE_FRAMES = 360
+_CONDITION_SHARES = (0.22, 0.26, 0.12, 0.12, 0.22, 0.06)
 _MIN_VISIBLE_PX = 12
 _MIN_VISIBLE_SHARE = 0.15
 """What shows less than this is left unmarked: a person who marks pictures would not see it."""
@@ -157,10 +160,10 @@ def _describe(plan: DatasetPlan, folder: Path, annotations: dict[str, Annotation
 
 
 def yolo_line(row: Row, size_px: tuple[int, int]) -> str:
-    """Return one line of a YOLO label file: class, centre and size as shares of the picture.
+    r"""Return one line of a YOLO label file: class, centre and size as shares of the picture.
 
     >>> yolo_line({"class_id": 2, "x1_px": -0.5, "y1_px": -0.5, "x2_px": 9.5, "y2_px": 4.5}, (20, 10))
-    '2 0.250000 0.250000 0.500000 0.500000\\n'
+    '2 0.250000 0.250000 0.500000 0.500000\n'
     """
     left, top, right, bottom = (row[f"{name}_px"] + 0.5 for name in ("x1", "y1", "x2", "y2"))
     width_px, height_px = size_px
@@ -181,7 +184,7 @@ def open_scene_shooter(plan: DatasetPlan) -> Generator[Callable[[int], list[Pict
     def shoot(scene: int) -> list[Picture]:
         nonlocal studio
         rng = np.random.default_rng([plan.seed, 49979687, scene])
-        site = build_site(random_plan(rng, plan.width_px, plan.height_px, plan.excavator_mesh))
+        site = build_site(_draw_plan(rng, plan))
         if studio is None:
             studio = Studio(site)
         count = min(plan.per_scene, plan.images - scene * plan.per_scene)
@@ -194,9 +197,31 @@ def open_scene_shooter(plan: DatasetPlan) -> Generator[Callable[[int], list[Pict
             studio.close()
 
 
-def _shoot(
-    studio: Studio, site: Site, plan: DatasetPlan, rng: np.random.Generator, scene: int, index: int
-) -> Picture:
+def _draw_plan(rng: np.random.Generator, plan: DatasetPlan) -> Plan:
+    """Draw a site of any kind, as busy or empty as sites are."""
+    shape = rng.choice(["square_footing", "quadrilateral_footing", "painted_square", "none"], p=[0.4, 0.25, 0.15, 0.2])
+    covers = (CoverPlan(str(rng.choice(sorted(COVER_KINDS))), -1.0, 2.0),) if rng.random() < 0.3 else ()
+    conditions = get_args(Condition)
+    preset = Preset(
+        "one scene of a data set",
+        "random",
+        width_px=plan.width_px,
+        height_px=plan.height_px,
+        frames=_SCENE_FRAMES,
+        altitude_m=float(rng.uniform(25.0, 45.0)),
+        shape=None if shape == "none" else str(shape),
+        covers=() if shape == "none" else covers,
+        style=str(rng.choice(list(SiteStyle))),
+        condition=conditions[int(rng.choice(len(conditions), p=_CONDITION_SHARES))],
+        clutter=float(rng.uniform(0.3, 1.6)),
+        furnished_m=40.0,
+        reference_offset_m=(float(rng.normal(0.0, 6.0)), float(rng.normal(0.0, 6.0))),
+    )
+    mesh = plan.excavator_mesh if rng.random() < 1 / 3 else None
+    return Plan("dataset", preset, int(rng.integers(MAX_SEED)), excavator_mesh=mesh)
+
+
+def _shoot(studio: Studio, site: Site, plan: DatasetPlan, rng: np.random.Generator, scene: int, index: int) -> Picture:
     time_s = rng.uniform(0.0, site.duration_s)
     flight = _look_at_somebody(site, plan, rng, time_s)
     studio.show(replace(site, scene=replace(site.scene, flight=flight)))
@@ -217,13 +242,13 @@ def _look_at_somebody(site: Site, plan: DatasetPlan, rng: np.random.Generator, t
     """Put the camera where one of the actors is in the picture, from any height and side."""
     bodies = scene_at(site.scene, time_s).bodies
     target = bodies[rng.integers(len(bodies))].centre_m if bodies else np.zeros(3)
-    camera = drone_camera(plan.width_px, plan.height_px, rng.uniform(45.0, 84.0), rng)
-    pitch_deg = rng.choice([rng.uniform(20.0, 45.0), rng.uniform(45.0, 75.0), rng.uniform(75.0, 90.0)], p=[0.4, 0.4, 0.2])
+    camera = drone_camera(plan.width_px, plan.height_px, float(rng.uniform(45.0, 84.0)), rng)
+    low_deg, high_deg = ((20.0, 45.0), (45.0, 75.0), (75.0, 90.0))[int(rng.choice(3, p=[0.4, 0.4, 0.2]))]
     return Still.over(
         camera,
         target[:2] + rng.normal(0.0, 4.0, 2),
         altitude_m=float(15.0 * 4.0 ** rng.beta(1.0, 1.6)),
-        pitch_deg=float(pitch_deg),
+        pitch_deg=float(rng.uniform(low_deg, high_deg)),
         heading_deg=float(rng.uniform(0.0, 360.0)),
         roll_deg=float(rng.normal(0.0, 1.0)),
     )

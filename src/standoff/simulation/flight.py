@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -16,9 +16,8 @@ from standoff.core.homography import FloatArray, invert
 from standoff.core.pose import View
 from standoff.simulation.band_noise import BandNoise
 from standoff.simulation.motion import Key, eased
+from standoff.simulation.presets import FlightStyle
 from standoff.simulation.scene import Flight
-
-FlightStyle = Literal["hover", "orbit", "pass", "away", "hand"]
 
 _BORDER_POINTS = 24
 _LENS_ATTEMPTS = 100

@@ -1,4 +1,4 @@
-"""Marks that machines and people leave on the ground: tyre and crawler prints, bucket scrapes, spills, sprayed lines."""
+"""Marks that machines and people leave on the ground: tyre and crawler prints, scrapes, spills, sprayed lines."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def _roll(rng: np.random.Generator, canvas: Canvas, layer: Picture, line_m: Floa
     left = np.column_stack([-along[:, 1], along[:, 0]])
     sides = [line_m + side * gauge_m / 2 * left for side in (-1.0, 1.0)]
     canvas.draw(layer, sides, _NEUTRAL + pressed // 2, width_m)
-    step = pitch_m / max(float(np.linalg.norm(line_m[1] - line_m[0])), 1e-3)
+    step = pitch_m / max(float(np.median(np.linalg.norm(np.diff(line_m, axis=0), axis=1))), 1e-3)
     at = np.arange(0.0, len(line_m) - 1, step)
     index = np.arange(len(line_m))
     bars = []
@@ -89,9 +89,7 @@ def _scrape(rng: np.random.Generator, canvas: Canvas, layer: Picture, centre_m: 
         origin = centre_m + left * 1.25 * stroke + ahead * rng.uniform(-0.6, 0.6)
         length_m = rng.uniform(1.5, 4.0)
         canvas.draw(layer, [np.stack([origin, origin + ahead * length_m])], _NEUTRAL + int(rng.integers(4, 18)), 1.2)
-        teeth = [
-            np.stack([origin + left * t, origin + left * t + ahead * length_m]) for t in np.linspace(-0.5, 0.5, 5)
-        ]
+        teeth = [np.stack([origin + left * t, origin + left * t + ahead * length_m]) for t in np.linspace(-0.5, 0.5, 5)]
         canvas.draw(layer, teeth, _NEUTRAL - int(rng.integers(10, 30)), 0.08)
 
 

@@ -1,4 +1,4 @@
-"""Where clutter lies: rows of stores, heaps around the work, things along the fence, and strays.
+"""Where clutter lies: rows of stores, crowds around the work, things along the fence and in the gaps between.
 
 Free ground is a raster. A thing takes the rectangle that its meshes cover, so that long things lie close together.
 """
@@ -31,7 +31,9 @@ _GAP_M = 0.04
 """Air that may show under the lowest ground."""
 _SHIFT = 4
 """Bits of cv2's fractions of a pixel."""
-_ZONE_SHARES = (0.4, 0.4, 0.12, 0.08)
+_ZONE_SHARES = (0.3, 0.32, 0.1, 0.28)
+_TIGHT = 1.4
+"""Radius of a thing over the free radius of a gap that is tried: few things are round."""
 _TRIES = 8
 _NUDGES = np.array([0.4, 0.9, 1.5])
 """Steps to the side, in lengths of the thing, that are tried where there is no room."""
@@ -55,7 +57,8 @@ def lay_out(
     Args:
         rng: Decides everything.
         props: To choose from, by weight.
-        density: Share 0..1 of the free ground that things shall cover; 0.3 is a crowded site.
+        density: Share 0..1 of the free ground that things shall cover; 0.15 is a busy site, and beyond about 0.25 no
+            more room is found.
         keep_clear: Nothing comes into these: paths of actors, the reference object (site frame).
         extent_m: West, south, east, north of the area.
         ground: Things stand on it.
@@ -146,6 +149,12 @@ class _Yard:
                 break
         return np.asarray(xy_m)
 
+    def gaps_m(self, rng: np.random.Generator, count: int) -> tuple[FloatArray, FloatArray]:
+        """Return (count, 2) random places and (count,) how far each is from the nearest thing, 0 on things."""
+        cells = rng.integers(0, self._size, (count, 2))
+        room = cv2.distanceTransform(1 - self._taken, cv2.DIST_L2, 3)
+        return self._origin_m + (cells + 0.5) * _CELL_M, room[cells[:, 1], cells[:, 0]].astype(np.float64) * _CELL_M
+
     def take(self, corners_m: FloatArray) -> None:
         """Mark a rectangle and the margin around it."""
         first, second = corners_m[1] - corners_m[0], corners_m[3] - corners_m[0]
@@ -157,7 +166,8 @@ class _Yard:
 
     def _pixels(self, outline_m: FloatArray) -> npt.NDArray[np.int32]:
         cells = (outline_m - self._origin_m) / _CELL_M - 0.5
-        return np.round(cells * 2**_SHIFT).astype(np.int32)
+        fixed: npt.NDArray[np.int32] = np.round(cells * 2**_SHIFT).astype(np.int32)
+        return fixed
 
 
 def _proposals(rng: np.random.Generator, props: Sequence[Prop], yard: _Yard, wanted_m2: float) -> Iterator[_Spot]:
@@ -177,7 +187,7 @@ def _proposals(rng: np.random.Generator, props: Sequence[Prop], yard: _Yard, wan
 
 @dataclass(frozen=True, slots=True)
 class _SiteGrid:
-    """What all zones share: how often and how large each prop is, the free ground, the direction of the building's axes."""
+    """What all zones share: chance and size of each prop, the free ground, the direction of the building."""
 
     chances: FloatArray
     radii_m: FloatArray
@@ -231,18 +241,23 @@ def _along_fence(rng: np.random.Generator, site: _SiteGrid) -> list[_Spot]:
     return _spots(kinds, xy, turns)
 
 
-def _strays(rng: np.random.Generator, site: _SiteGrid) -> list[_Spot]:
-    """Single things anywhere, in any direction."""
-    count = int(rng.integers(6, 15))
-    xy = np.stack([site.yard.somewhere_m(rng) for _ in range(count)])
-    return _spots(site.choose(rng, count), xy, rng.uniform(0.0, 2 * np.pi, count))
+def _gaps(rng: np.random.Generator, site: _SiteGrid) -> list[_Spot]:
+    """Things left in gaps that they just fit into, in any direction."""
+    count = int(rng.integers(15, 35))
+    xy, clearance_m = site.yard.gaps_m(rng, count)
+    chances = np.where(site.radii_m <= _TIGHT * clearance_m[:, None], site.chances, 0.0).cumsum(axis=1)
+    fits = chances[:, -1] > 0.0
+    drawn = rng.uniform(0.0, 1.0, count)[:, None] * chances[:, -1:]
+    kinds = (chances <= drawn).sum(axis=1)
+    turns = np.where(rng.uniform(size=count) < 0.5, rng.uniform(0.0, 2 * np.pi, count), site.axis_rad)
+    return _spots(kinds[fits], xy[fits], turns[fits])
 
 
 def _spots(props: npt.NDArray[np.intp], xy_m: FloatArray, turns_rad: FloatArray) -> list[_Spot]:
     return [_Spot(int(prop), xy, float(turn)) for prop, xy, turn in zip(props, xy_m, turns_rad, strict=True)]
 
 
-_ZONES = (_store, _work, _along_fence, _strays)
+_ZONES = (_store, _work, _along_fence, _gaps)
 
 
 @lru_cache(maxsize=4096)
@@ -276,10 +291,12 @@ def _stand(spot: _Spot, corners_m: FloatArray, top_m: float, ground: Ground) -> 
     first, second = corners_m[1] - corners_m[0], corners_m[3] - corners_m[0]
     offset = corners_m[0] + u * first + v * second - spot.xy_m
     height_m = ground.height_at(offset + spot.xy_m)
-    plane, *_ = np.linalg.lstsq(np.column_stack([offset, np.ones(len(offset))]), height_m, rcond=None)
-    slope = np.array([0.0, 0.0]) if top_m > _TALL_M else plane[:2]
+    # the least-squares plane over a symmetric lattice: along each side alone
+    tilt = first * (height_m @ (u - 0.5)) / (first @ first) + second * (height_m @ (v - 0.5)) / (second @ second)
+    tilt /= float(((u - 0.5) ** 2).sum())
+    slope = np.array([0.0, 0.0]) if top_m > _TALL_M else tilt
     below = height_m - offset @ slope
-    if np.hypot(*plane[:2]) > _STEEPEST or np.ptp(below) > _ROUGHEST_M:
+    if tilt @ tilt > _STEEPEST**2 or np.ptp(below) > _ROUGHEST_M:
         return None
     up = np.array([-slope[0], -slope[1], 1.0]) / np.sqrt(1.0 + slope @ slope)
     forward = np.array([np.cos(spot.turn_rad), np.sin(spot.turn_rad), 0.0])

@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Literal
 
 import numpy as np
 
 from standoff.core.homography import FloatArray
 from standoff.simulation.mesh import Colour
+from standoff.simulation.presets import Condition
 from standoff.simulation.scene import Light
-
-Condition = Literal["noon", "afternoon", "low_sun", "hazy", "overcast", "dusk"]
 
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 _GROUND_ALBEDO: Colour = (0.26, 0.21, 0.15)
@@ -96,8 +94,8 @@ def _sun_colour(elevation_deg: float) -> FloatArray:
     wavelength_um = np.array([0.610, 0.550, 0.465])
     depth = 0.0088 * wavelength_um**-4.05 + 0.08 * wavelength_um**-1.3
     passed = np.exp(-depth * air_mass)
-    # white is the sun at one and a half air masses, as cameras' daylight balance has it
-    colour: FloatArray = passed / np.exp(-depth * 1.5)
+    # white is the sun at noon, as cameras' daylight balance has it
+    colour: FloatArray = passed / np.exp(-depth * 1.15)
     return colour
 
 

@@ -10,7 +10,8 @@ from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.homography import FloatArray
 from standoff.core.pose import View
 from standoff.simulation.motion import Placement, place_on_ground, sample
-from standoff.simulation.scene import Actor, Batch, Cover, Ground, Reference, Scene
+from standoff.simulation.props.prop import moved
+from standoff.simulation.scene import CARRIED, NOTHING, Actor, Batch, Cover, Ground, Reference, Scene
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -21,6 +22,7 @@ class Body:
         entity_id: Of the truth.
         class_id: Of `standoff.core.classes`.
         batches: All its parts, site frame.
+        carried: What it carries, not counted to it.
         centre_m: (3,) middle of its footprint on the ground, site frame.
         heading_rad: Of its local x, counter-clockwise from east.
         velocity_mps: (2,) site frame.
@@ -31,6 +33,7 @@ class Body:
     entity_id: int
     class_id: int
     batches: tuple[Batch, ...]
+    carried: tuple[Batch, ...]
     centre_m: FloatArray
     heading_rad: float
     velocity_mps: FloatArray
@@ -59,7 +62,7 @@ class Moment:
     @property
     def batches(self) -> tuple[Batch, ...]:
         """Return everything that moves or changes, for the renderer."""
-        return tuple(batch for body in self.bodies for batch in body.batches) + self.loose
+        return tuple(batch for body in self.bodies for batch in body.batches + body.carried) + self.loose
 
 
 def scene_at(scene: Scene, time_s: float) -> Moment:
@@ -80,13 +83,12 @@ def _actor_body(actor: Actor, time_s: float, ground: Ground) -> Body:
     tip_m = model.tool_tip_m(placement.joints)
     rotation, offset = local_to_site[:3, :3], local_to_site[:3, 3]
     outline = np.column_stack([model.footprint_m, np.zeros(len(model.footprint_m))]) @ rotation.T + offset
+    parts = moved(model.parts(placement.joints), local_to_site)
     return Body(
         actor.entity_id,
         model.class_id,
-        tuple(
-            replace(batch, poses=(local_to_site @ batch.poses).astype(np.float32), entity_id=actor.entity_id)
-            for batch in model.parts(placement.joints)
-        ),
+        tuple(replace(part, entity_id=actor.entity_id) for part in parts if part.entity_id != CARRIED),
+        tuple(replace(part, entity_id=NOTHING) for part in parts if part.entity_id == CARRIED),
         offset.copy(),
         placement.heading_rad,
         placement.velocity_mps,
@@ -101,6 +103,7 @@ def _reference_body(reference: Reference) -> Body:
         reference.entity_id,
         CLASS_BY_NAME["reference"].id,
         reference.batches,
+        (),
         reference.base_m.mean(axis=0),
         float(np.arctan2(edge[1], edge[0])),
         np.zeros(2),

@@ -28,7 +28,9 @@ def whole_folder(out: Path, *, overwrite: bool) -> Generator[Path, None, None]:
         raise OutputError(expected="an output folder", found=f"the file {out}", fix="choose another folder")
     if out.is_dir() and any(out.iterdir()) and not overwrite:
         raise OutputError(
-            expected="a new or empty output folder", found=f"files in {out}", fix="choose another one or pass --overwrite"
+            expected="a new or empty output folder",
+            found=f"files in {out}",
+            fix="choose another one or pass --overwrite",
         )
     staging = out.parent / f".{out.name}.partial"
     try:

@@ -28,7 +28,10 @@ def lay_land(
     outside = np.any(np.abs(middle) > np.array(size_m) / 2, axis=1)
     column, row = column[outside], row[outside]
     corners = np.stack(
-        [np.column_stack([x_m[column + i], y_m[row + j], np.full(len(row), _LAND_M)]) for i, j in ((0, 0), (1, 0), (1, 1), (0, 1))],
+        [
+            np.column_stack([x_m[column + i], y_m[row + j], np.full(len(row), _LAND_M)])
+            for i, j in ((0, 0), (1, 0), (1, 1), (0, 1))
+        ],
         axis=1,
     )
     palette = np.array([srgb(tone) for tone in tones])
@@ -78,23 +81,34 @@ def lay_street(length_m: float, width_m: float, variant: int) -> Mesh:
     worn = 0.5 * rng.uniform(0.5, 1.0, (len(dashes), 1)) * np.ones(3)
     patch_x, patch_y = rng.uniform(-length_m / 2, length_m / 2, 24), rng.uniform(-half, half - 2.0, 24)
     patches = np.concatenate(
-        [level(x, y, x + rng.uniform(1.5, 9.0), y + rng.uniform(0.6, 2.0), 0.12) for x, y in zip(patch_x, patch_y, strict=True)]
+        [
+            level(x, y, x + rng.uniform(1.5, 9.0), y + rng.uniform(0.6, 2.0), 0.12)
+            for x, y in zip(patch_x, patch_y, strict=True)
+        ]
     )
     parts += [panels(white, worn), panels(patches, srgb("#4b4a4a"), Surface.CONCRETE)]
     return join(parts)
 
 
+_BODIES = (
+    ((-2.2, 0.3), (2.2, 0.3), (2.2, 0.7), (0.9, 0.92), (-1.6, 0.95), (-2.2, 0.9)),
+    ((-1.9, 0.3), (1.9, 0.3), (1.9, 0.75), (0.9, 0.95), (-1.9, 0.98)),
+    ((-2.6, 0.35), (2.5, 0.35), (2.5, 1.0), (1.9, 1.2), (-2.6, 1.2)),
+)
+_CABINS = (
+    ((-1.6, 0.93), (1.0, 0.9), (0.3, 1.4), (-1.1, 1.42)),
+    ((-1.85, 0.95), (1.0, 0.93), (0.35, 1.52), (-1.5, 1.52)),
+    ((-2.6, 1.15), (1.95, 1.15), (1.3, 2.15), (-2.55, 2.2)),
+)
+
+
 @lru_cache
 def parked_car(variant: int) -> Mesh:
     """Return a plain car, paint tintable; variants 0 to CAR_VARIANTS - 1: saloon, hatchback, van."""
-    body, cabin = (
-        (((-2.2, 0.3), (2.2, 0.3), (2.2, 0.7), (0.9, 0.92), (-1.6, 0.95), (-2.2, 0.9)), ((-1.6, 0.93), (1.0, 0.9), (0.3, 1.4), (-1.1, 1.42))),
-        (((-1.9, 0.3), (1.9, 0.3), (1.9, 0.75), (0.9, 0.95), (-1.9, 0.98)), ((-1.85, 0.95), (1.0, 0.93), (0.35, 1.52), (-1.5, 1.52))),
-        (((-2.6, 0.35), (2.5, 0.35), (2.5, 1.0), (1.9, 1.2), (-2.6, 1.2)), ((-2.6, 1.15), (1.95, 1.15), (1.3, 2.15), (-2.55, 2.2))),
-    )[variant]  # fmt: skip
+    cabin = _CABINS[variant]
     back, front = cabin[-1], cabin[-2]
     roof = box((front[0] - back[0] + 0.05, 1.5, 0.06), None).at((front[0] + back[0]) / 2, 0.0, back[1] - 0.03)
-    parts = [profile(body, 1.78, None), profile(cabin, 1.6, (0.035, 0.04, 0.045), Surface.GLASS), roof]
+    parts = [profile(_BODIES[variant], 1.78, None), profile(cabin, 1.6, (0.035, 0.04, 0.045), Surface.GLASS), roof]
     if variant == 2:
         parts.append(box((2.6, 1.66, 0.9), None).at(-1.2, 0.0, 1.2))
     wheels = [

@@ -9,11 +9,12 @@ from types import MappingProxyType
 from typing import Literal
 
 from standoff.core.errors import ConfigError
-from standoff.simulation.flight import FlightStyle
-from standoff.simulation.light import Condition
 
-Style = Literal["earthworks", "foundations", "structure", "road", "yard"]
-Shape = Literal["square_footing", "quadrilateral_footing", "painted_square", "board"]
+Condition = Literal["noon", "afternoon", "low_sun", "hazy", "overcast", "dusk"]
+"""Weather and hour."""
+
+FlightStyle = Literal["hover", "orbit", "pass", "away", "hand"]
+"""How the camera moves; `standoff.simulation.flight.make_flight` says what each does."""
 
 MAX_SEED = 2**31 - 1
 _MIN_SIDE_PX, _MAX_SIDE_PX = 64, 7680
@@ -49,12 +50,13 @@ class Preset:
         altitude_m: Of the camera above the site's datum.
         pitch_deg: Of the gimbal, downwards from the horizon.
         field_deg: Horizontal field of view.
-        motion: How the drone flies.
-        shape: Of the reference object; None for none.
+        motion: How the drone flies; a style of `standoff.simulation.flight.make_flight`.
+        shape: Of the reference object, a kind of `standoff.simulation.reference`; None for none.
         covers: What lies on it.
-        style: Of the site.
-        condition: Of the light.
+        style: Of the site, one of `standoff.simulation.site_plans.SiteStyle`.
+        condition: Of the light; see `standoff.simulation.light.random_light`.
         clutter: Density of props, 1 is a busy site.
+        furnished_m: Props stand within this distance of the middle; None: where the camera looks.
         reference_offset_m: Right of and beyond the middle of the picture, of the reference object's centre.
     """
 
@@ -68,18 +70,19 @@ class Preset:
     pitch_deg: float = 52.0
     field_deg: float = 70.0
     motion: FlightStyle = "hover"
-    shape: Shape | None = "square_footing"
+    shape: str | None = "square_footing"
     covers: tuple[CoverPlan, ...] = ()
-    style: Style = "earthworks"
+    style: str = "earthworks"
     condition: Condition = "afternoon"
     clutter: float = 1.0
+    furnished_m: float | None = None
     reference_offset_m: tuple[float, float] = (-3.0, -2.0)
 
 
 PRESETS: Mapping[str, Preset] = MappingProxyType(
     {
         "mobile": Preset(
-            "The paper's mobile test: worker, wheel loader and excavator about a 2.89 m footing, sand on it for a while.",
+            "The paper's mobile test: worker, loader and excavator about a 2.89 m footing, sand on it for a while.",
             "mobile", width_px=3840, height_px=2140, frames=398,
             covers=(CoverPlan("sand_corner", 0.42, 0.53),),
         ),
@@ -99,7 +102,7 @@ PRESETS: Mapping[str, Preset] = MappingProxyType(
         ),
         "board": Preset(
             "The paper's lab test at full size: a checkerboard of 25 m under a drone.",
-            "board", frames=148, motion="orbit", shape="board", style="yard", altitude_m=32.0, condition="hazy",
+            "board", frames=148, motion="orbit", shape="board", style="yard", altitude_m=38.0, condition="afternoon",
             clutter=0.5, reference_offset_m=(0.0, 0.0),
         ),
         "busy": Preset(

@@ -33,6 +33,7 @@ from standoff.stages.ground import save_camera
 FORMAT = 1
 """Of the clip folder; `scene.json` carries it."""
 
+
 def frame_times_s(plan: Plan) -> FloatArray:
     """Return (N,) presentation times.
 
@@ -40,10 +41,10 @@ def frame_times_s(plan: Plan) -> FloatArray:
     """
     count, interval_s = plan.preset.frames, 1.0 / plan.preset.fps
     if not plan.variable_rate:
-        return np.arange(count) * interval_s
+        return np.arange(count, dtype=np.float64) * interval_s
     rng = np.random.default_rng([plan.seed, 104729])
     intervals_s = interval_s * rng.uniform(0.8, 1.2, count - 1) * rng.choice([1.0, 2.0], count - 1, p=[0.975, 0.025])
-    return np.concatenate([[0.0], np.cumsum(intervals_s)])
+    return np.concatenate([np.zeros(1), np.cumsum(intervals_s)])
 
 
 def record_clip(
@@ -84,7 +85,8 @@ def record_clip(
         _save_json(describe_scene(plan, site), folder / "scene.json")
         save_camera(site.camera, folder / "camera.yaml")
         _save_reference(site.scene.reference, folder / "reference.yaml")
-        write_telemetry(folder / "telemetry.srt", site.scene.flight, times_s, np.random.default_rng([plan.seed, 1299709]))
+        errors = np.random.default_rng([plan.seed, 1299709])
+        write_telemetry(folder / "telemetry.srt", site.scene.flight, times_s, errors)
 
 
 @contextmanager

@@ -6,6 +6,7 @@ Its four upper corners are vertices of its mesh, its edges are sharp: what a cor
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from itertools import pairwise
 from types import MappingProxyType
 
 import numpy as np
@@ -62,7 +63,7 @@ def make_reference(
     flat_site = _through(upright, corners_m, 0.0)[:, :2]
     grid = _bilinear(flat_site, 9).reshape(-1, 2)
     level_m = float(np.max(ground.height_at(grid)))
-    pose = (translation(0.0, 0.0, level_m) @ upright).astype(np.float32)
+    pose = (translation(0.0, 0.0, level_m) @ upright).astype(np.float32).astype(np.float64)
     top_m = _through(pose, corners_m, height_m)
     base_m = np.column_stack([top_m[:, :2], ground.height_at(top_m[:, :2])])
     batch = place(mesh, pose, dust=float(rng.uniform(0.05, 0.3)) if worn else 0.0, entity_id=entity_id)
@@ -122,7 +123,7 @@ def _prism(corners_m: FloatArray, height_m: float, colour: Colour, surface: Surf
     steps = np.linspace(0.0, 1.0, count)[:, None]
     top = _bilinear(corners_m, count)
     faces = [np.concatenate([top, np.full((*top.shape[:2], 1), height_m)], axis=-1)]
-    for start, stop in zip(closed[:-1], closed[1:], strict=True):
+    for start, stop in pairwise(closed):
         line = start * (1 - steps) + stop * steps
         faces.append(np.stack([np.column_stack([line, np.full(count, z)]) for z in (height_m, 0.0, -_ROOT_M)]))
     return join([relief(face, colour, surface, mottling=stains) for face in faces])

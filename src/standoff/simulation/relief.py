@@ -50,12 +50,20 @@ def grid_shape(plan: TerrainPlan) -> tuple[int, int]:
     return rows, columns
 
 
+def surface_size_m(plan: TerrainPlan) -> tuple[float, float]:
+    """Return the size from the first to the last sample, east-west and north-south: whole cells.
+
+    >>> surface_size_m(TerrainPlan(extent_m=(60.2, 30.0), cell_m=0.5))
+    (60.0, 30.0)
+    """
+    rows, columns = grid_shape(plan)
+    return (columns - 1) * plan.cell_m, (rows - 1) * plan.cell_m
+
+
 def _axes(plan: TerrainPlan, shape: tuple[int, int]) -> tuple[FloatArray, FloatArray]:
     rows, columns = shape
-    return (
-        (np.arange(columns) - (columns - 1) / 2) * plan.cell_m,
-        (np.arange(rows) - (rows - 1) / 2) * plan.cell_m,
-    )
+    half_x_m, half_y_m = (columns - 1) * plan.cell_m / 2, (rows - 1) * plan.cell_m / 2
+    return np.linspace(-half_x_m, half_x_m, columns), np.linspace(-half_y_m, half_y_m, rows)
 
 
 def _smooth(share: FloatArray) -> FloatArray:
@@ -85,7 +93,7 @@ def _strip(plan: TerrainPlan, shape: tuple[int, int], paths: tuple[Path, ...], w
     """Return (ny, nx) 0..1: the share of a cell that strips of a width along paths cover."""
     fine = 3
     mask = np.zeros((shape[0] * fine, shape[1] * fine), np.uint8)
-    half = np.array(plan.extent_m) / 2
+    half = np.array(surface_size_m(plan)) / 2
     lines = [
         np.round((((np.array(path) + half) / plan.cell_m + 0.5) * fine - 0.5) * 16).astype(np.int32) for path in paths
     ]
@@ -109,7 +117,9 @@ def beside(path: Path, offset_m: float) -> Path:
 def _roll_roads(height: npt.NDArray[np.float64], plan: TerrainPlan) -> None:
     if not plan.roads:
         return
-    weight = cv2.GaussianBlur(_strip(plan, (height.shape[0], height.shape[1]), plan.roads, plan.road_width_m), None, 3.0)
+    weight = cv2.GaussianBlur(
+        _strip(plan, (height.shape[0], height.shape[1]), plan.roads, plan.road_width_m), None, 3.0
+    )
     rolled = cv2.GaussianBlur(height, None, 2.5 / plan.cell_m) - 0.05
     height += 0.9 * weight * (rolled - height)
 
@@ -123,13 +133,9 @@ def _press_ruts(height: npt.NDArray[np.float64], plan: TerrainPlan) -> None:
     height += _RUT_DEPTH_M * (0.9 * berm - cv2.GaussianBlur(pressed, None, 0.15 / plan.cell_m))
 
 
-def _window(
-    low_m: FloatArray, high_m: FloatArray, axes: tuple[FloatArray, FloatArray]
-) -> tuple[slice, slice]:
+def _window(low_m: FloatArray, high_m: FloatArray, axes: tuple[FloatArray, FloatArray]) -> tuple[slice, slice]:
     """Return rows and columns of the samples inside a box."""
-    columns, rows = (
-        slice(*np.searchsorted(axis, (low_m[i], high_m[i]))) for i, axis in enumerate(axes)
-    )
+    columns, rows = (slice(*np.searchsorted(axis, (low_m[i], high_m[i]))) for i, axis in enumerate(axes))
     return rows, columns
 
 

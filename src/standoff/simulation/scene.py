@@ -20,6 +20,10 @@ NOTHING = 0
 """The entity id of everything that the truth does not name."""
 
 
+CARRIED = 0xFFFF
+"""The entity id, in `Model.parts`, of what somebody carries: people who mark pictures do not count it to the person."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Batch:
     """One mesh in many places.
@@ -90,11 +94,16 @@ class Ground(Protocol):
         wetness: (h, w) uint8, 0 dry .. 255 standing water.
     """
 
-    origin_xy_m: FloatArray
-    cell_m: float
-    height_m: Float32Array
-    albedo: npt.NDArray[np.uint8]
-    wetness: npt.NDArray[np.uint8]
+    @property
+    def origin_xy_m(self) -> FloatArray: ...  # noqa: D102
+    @property
+    def cell_m(self) -> float: ...  # noqa: D102
+    @property
+    def height_m(self) -> Float32Array: ...  # noqa: D102
+    @property
+    def albedo(self) -> npt.NDArray[np.uint8]: ...  # noqa: D102
+    @property
+    def wetness(self) -> npt.NDArray[np.uint8]: ...  # noqa: D102
 
     def height_at(self, xy_m: FloatArray) -> FloatArray:
         """Return (N,) heights of the rendered surface under (N, 2); the border's height outside."""
@@ -111,13 +120,17 @@ class Model(Protocol):
         joints: Allowed range of each joint.
     """
 
-    class_id: int
-    footprint_m: FloatArray
-    height_m: float
-    joints: Mapping[str, tuple[float, float]]
+    @property
+    def class_id(self) -> int: ...  # noqa: D102
+    @property
+    def footprint_m(self) -> FloatArray: ...  # noqa: D102
+    @property
+    def height_m(self) -> float: ...  # noqa: D102
+    @property
+    def joints(self) -> Mapping[str, tuple[float, float]]: ...  # noqa: D102
 
     def parts(self, joints: Mapping[str, float]) -> tuple[Batch, ...]:
-        """Return all rigid parts, poses in the model's local frame, entity_id NOTHING."""
+        """Return all rigid parts, poses in the model's local frame, entity_id NOTHING or CARRIED."""
         ...
 
     def tool_tip_m(self, joints: Mapping[str, float]) -> FloatArray | None:

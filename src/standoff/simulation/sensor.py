@@ -17,7 +17,7 @@ from scipy.ndimage import gaussian_filter
 from standoff.core.homography import FloatArray
 from standoff.core.types import ImageArray
 from standoff.simulation.band_noise import BandNoise
-from standoff.simulation.light import Condition
+from standoff.simulation.presets import Condition
 from standoff.stages.sinks.encoder import VideoFile
 from standoff.stages.sinks.folder import partial_path
 
@@ -227,5 +227,4 @@ class VideoWriter:
         """Remove what was written."""
         if self._open:
             self._open = False
-            self._file.close()
-            self._partial.unlink(missing_ok=True)
+            self._file.discard()

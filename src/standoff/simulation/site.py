@@ -87,10 +87,8 @@ def build_site(plan: Plan) -> Site:
     ground = _shape_ground(rng["ground"], preset, cast, reference_xy_m)
     reference = _place_reference(rng["reference"], plan, reference_xy_m, heading_deg, ground)
     light = random_light(rng["light"], preset.condition)
-    clear = list(cast.ways)
-    if reference is not None:
-        clear.append(shapely.Polygon(reference.base_m[:, :2]).buffer(_REFERENCE_CLEAR_M))
-    props = _furnish(rng["props"], preset, clear, _seen(flight, plan.duration_s), ground)
+    bed = shapely.Polygon() if reference is None else shapely.Polygon(reference.base_m[:, :2])
+    props = _furnish(rng["props"], preset, cast, bed, _furnished(plan, flight), ground)
     props += _fence_in(rng["props"], ground)
     shade = light.to_sun if rng["surroundings"].random() < 0.35 else None
     props += make_surroundings(rng["surroundings"], ground, shade_to_sun=shade)
@@ -133,18 +131,18 @@ def _place_reference(
         rng, preset.shape, _pair(xy_m), turn_deg, ground, _REFERENCE_ID, worn=plan.name != "virtual"
     )
     covers = tuple(
-        make_cover(
-            rng, cover.kind, reference, ground, cover.start * plan.duration_s, cover.stop * plan.duration_s
-        )
+        make_cover(rng, cover.kind, reference, ground, cover.start * plan.duration_s, cover.stop * plan.duration_s)
         for cover in preset.covers
     )
     return replace(reference, covers=covers)
 
 
-def _seen(flight: Flight, duration_s: float) -> tuple[float, float, float, float]:
-    """Return west, south, east, north of the ground that the camera ever sees, as far as props are worth it."""
+def _furnished(plan: Plan, flight: Flight) -> tuple[float, float, float, float]:
+    """Return west, south, east, north of the ground for props: what the camera ever sees, as far as it is worth it."""
+    if (reach_m := plan.preset.furnished_m) is not None:
+        return -reach_m, -reach_m, reach_m, reach_m
     corners = []
-    for time_s in np.linspace(0.0, duration_s, 5):
+    for time_s in np.linspace(0.0, plan.duration_s, 5):
         view = flight.view(float(time_s))
         width_px, height_px = view.camera.width_px, view.camera.height_px
         edge_px = np.array([[0, 0], [width_px, 0], [width_px, height_px], [0, height_px]], dtype=np.float64)
@@ -157,15 +155,15 @@ def _seen(flight: Flight, duration_s: float) -> tuple[float, float, float, float
 
 
 def _furnish(
-    rng: np.random.Generator, preset: Preset, clear: list[shapely.Polygon],
+    rng: np.random.Generator, preset: Preset, cast: Cast, bed: shapely.Polygon,
     extent_m: tuple[float, float, float, float], ground: Ground,
 ) -> tuple[Batch, ...]:  # fmt: skip
+    """Lay out clutter, away from everybody's ways and from the reference object's bed."""
     families = [*CLUTTER, *PLANT.values()]
-    density = _COVERED_SHARE * preset.clutter
-    laid = lay_out(rng, families, density, clear, extent_m, ground)
-    west, south, east, north = extent_m
-    litter = int(0.5 * preset.clutter * (east - west) * (north - south))
-    return laid + scatter_litter(rng, litter, shapely.box(*extent_m), ground.height_at)
+    clear = [*cast.ways, bed.buffer(_REFERENCE_CLEAR_M)]
+    laid = lay_out(rng, families, _COVERED_SHARE * preset.clutter, clear, extent_m, ground)
+    region = shapely.box(*extent_m) - bed.buffer(0.1)
+    return laid + scatter_litter(rng, int(0.5 * preset.clutter * region.area), region, ground.height_at)
 
 
 def _fence_in(rng: np.random.Generator, ground: Ground) -> tuple[Batch, ...]:

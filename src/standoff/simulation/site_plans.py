@@ -71,7 +71,8 @@ def random_plan(
     style = style or styles[int(rng.choice(len(styles), p=[0.28, 0.24, 0.2, 0.14, 0.14]))]
     kept = [shapely.Point(patch.centre_m).buffer(patch.radius_m + _PATCH_MARGIN_M) for patch in patches]
     sketch = _Sketch(rng, np.array(extent_m) / 2, shapely.union_all(kept))
-    turn_deg = float(rng.uniform(0.0, 90.0))
+    # Most sites lie along their streets; along the height samples, too, walls of pits are straight.
+    turn_deg = float(rng.uniform(0.0, 90.0)) if rng.random() < 0.2 else 0.0
     draw = {
         SiteStyle.EARTHWORKS: _earthworks,
         SiteStyle.FOUNDATIONS: _foundations,
@@ -117,7 +118,7 @@ def _earthworks(sketch: _Sketch, turn_deg: float) -> TerrainPlan:
 def _foundations(sketch: _Sketch, turn_deg: float) -> TerrainPlan:
     """Lay out a grid of footings with trenches between some of them."""
     rng = sketch.rng
-    pitch_m, side_m = rng.uniform(5.0, 8.5, 2), rng.uniform(1.4, 3.2)
+    pitch_m, side_m = rng.uniform(5.0, 8.5, 2), rng.uniform(1.8, 3.4)
     rows, columns = rng.integers(3, 8, 2)
     middle, depth_m = rng.uniform(-0.3, 0.3, 2) * sketch.half_m, float(rng.uniform(0.5, 1.6))
     for row in range(rows):
@@ -146,7 +147,7 @@ def _structure(sketch: _Sketch, turn_deg: float) -> TerrainPlan:
     for _ in range(int(rng.integers(1, 4))):
         _cast_slab(sketch, rng.uniform(12.0, 34.0, 2), turn_deg, float(rng.uniform(0.05, 0.5)))
     for _ in range(int(rng.integers(1, 3))):
-        _excavate(sketch, rng.uniform(6.0, 14.0), rng.uniform(1.5, 4.0), corners=4)
+        _dig_square(sketch, rng.uniform(7.0, 20.0, 2), turn_deg)
     if rng.random() < 0.6:
         _trench(sketch, turn_deg)
     _haul(sketch, 1)
@@ -164,12 +165,12 @@ def _road(sketch: _Sketch, turn_deg: float) -> TerrainPlan:
     rng = sketch.rng
     reach_m = float(np.hypot(*sketch.half_m))
     line = np.array([[x, 6.0 * np.sin(x / 40.0)] for x in np.linspace(-reach_m, reach_m, 24)])
-    line += (0.0, rng.uniform(-8.0, 8.0))
+    line += np.array([0.0, rng.uniform(-8.0, 8.0)])
     spin = np.deg2rad(turn_deg)
     line = line @ np.array([[np.cos(spin), np.sin(spin)], [-np.sin(spin), np.cos(spin)]])
     sketch.roads.append(_path(line))
     for shift_m in rng.uniform(-4.0, 4.0, 5):
-        sketch.tracks.append(_path(line + (0.0, shift_m)))
+        sketch.tracks.append(_path(line + np.array([0.0, shift_m])))
     width_m = float(rng.uniform(8.0, 14.0))
     sketch.taken = sketch.taken.union(shapely.LineString(line).buffer(width_m / 2))
     _trench(sketch, turn_deg)
@@ -209,17 +210,27 @@ def _path(points_m: FloatArray) -> Path:
     return tuple((float(x), float(y)) for x, y in points_m)
 
 
-def _excavate(sketch: _Sketch, radius_m: float, depth_m: float, corners: int = 7) -> None:
-    """Dig an irregular pit; a deep one gets a deeper part inside."""
+def _excavate(sketch: _Sketch, radius_m: float, depth_m: float) -> None:
+    """Dig an irregular pit with a deeper part inside."""
     rng = sketch.rng
     for _ in range(_TRIES):
-        angles = np.linspace(0.0, 2 * np.pi, corners, endpoint=False) + rng.uniform(0.0, 2 * np.pi)
-        radii = radius_m * rng.uniform(0.75, 1.0, corners)
+        angles = np.linspace(0.0, 2 * np.pi, 9, endpoint=False) + rng.uniform(0.0, 2 * np.pi)
+        radii = radius_m * rng.uniform(0.75, 1.0, 9)
         outline = shapely.Polygon(sketch.spot() + radii[:, None] * np.column_stack([np.cos(angles), np.sin(angles)]))
         if sketch.claim(outline, 1.5):
             sketch.pits.append(Pit(_corners(outline), float(depth_m) / 2))
             inner = affinity.scale(outline, 0.72, 0.72, origin=outline.exterior.coords[0])
             sketch.pits.append(Pit(_corners(affinity.scale(inner, 0.93, 0.93)), float(depth_m) / 2))
+            return
+
+
+def _dig_square(sketch: _Sketch, size_m: FloatArray, turn_deg: float) -> None:
+    """Dig a pit for a cellar: right angles, vertical walls."""
+    rng = sketch.rng
+    for _ in range(_TRIES):
+        outline = affinity.translate(affinity.rotate(shapely.box(0.0, 0.0, *size_m), turn_deg), *sketch.spot())
+        if sketch.claim(outline, 1.5):
+            sketch.pits.append(Pit(_corners(outline), float(rng.uniform(1.5, 4.0))))
             return
 
 

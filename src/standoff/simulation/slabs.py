@@ -52,9 +52,7 @@ def _concrete(
         angles = start + np.linspace(0.0, bend, 30)
         radius_m = rng.uniform(4.0, 2.0 * spread)
         hub = centre + rng.normal(0.0, 0.3 * spread, 2) - radius_m * np.array([np.cos(start), np.sin(start)])
-        arcs = [
-            hub + (radius_m + gauge) * np.column_stack([np.cos(angles), np.sin(angles)]) for gauge in (-0.9, 0.9)
-        ]
+        arcs = [hub + (radius_m + gauge) * np.column_stack([np.cos(angles), np.sin(angles)]) for gauge in (-0.9, 0.9)]
         canvas.draw(lines, arcs, int(rng.integers(18, 60)), 0.3)
     tone -= 0.6 * cv2.blur(lines, (2, 2))[window]
     return np.asarray(tone, np.float32)

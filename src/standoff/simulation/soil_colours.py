@@ -24,7 +24,7 @@ def _ramp(*codes: str) -> npt.NDArray[np.uint8]:
 PALETTES: Mapping[str, npt.NDArray[np.uint8]] = MappingProxyType(
     {
         Soil.BROWN_EARTH: _ramp("#2c231b", "#57483a", "#857361", "#a8967f", "#c6b8a2"),
-        Soil.RED_CLAY: _ramp("#40261b", "#75503d", "#a07861", "#b99580", "#d2b8a5"),
+        Soil.RED_CLAY: _ramp("#3d2a1c", "#6f523b", "#9a795a", "#b79879", "#d3bfa3"),
         Soil.GREY_GRAVEL: _ramp("#33322f", "#63615d", "#8f8c86", "#adaaa3", "#d2cfc8"),
         Soil.OCHRE_SAND: _ramp("#54462f", "#8b7a5c", "#b5a485", "#cabb9e", "#e0d5bf"),
         Soil.WET_MUD: _ramp("#1f1b16", "#413a31", "#655c50", "#82786a", "#a69c8d"),

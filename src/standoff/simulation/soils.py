@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
-
 import cv2
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +11,7 @@ from standoff.core.homography import FloatArray
 from standoff.simulation.canvas import Canvas, Picture, fractal
 from standoff.simulation.ground_marks import draw_prints, paint_blots, paint_lines
 from standoff.simulation.mesh import Float32Array
+from standoff.simulation.relief import surface_size_m
 from standoff.simulation.slabs import paint_slabs
 from standoff.simulation.soil_colours import PALETTES, palette_of
 from standoff.simulation.terrain_plan import Soil, TerrainPlan
@@ -27,9 +26,9 @@ _SOILS = tuple(soil for soil in Soil if soil not in (Soil.MIXED, Soil.CONCRETE))
 def paint_ground(
     rng: np.random.Generator, plan: TerrainPlan, height_m: Float32Array
 ) -> tuple[Picture, npt.NDArray[np.uint8]]:
-    """Return albedo (h, w, 3) uint8 sRGB, red first, and wetness (h, w) uint8 of a shaped ground, row 0 in the south."""
-    canvas = Canvas.of(plan.extent_m, _LONGEST_PX)
-    coarse = Canvas.of(plan.extent_m, _LONGEST_PX // 2)
+    """Return albedo (h, w, 3) uint8 sRGB, red first, and wetness (h, w) uint8 of a shaped ground; row 0 is south."""
+    canvas = Canvas.of(surface_size_m(plan), _LONGEST_PX)
+    coarse = Canvas.of(surface_size_m(plan), _LONGEST_PX // 2)
     lows = _lows(plan, height_m, coarse)
     wet = _wetness(rng, plan, lows)
     prints = draw_prints(rng, canvas, plan)
@@ -171,7 +170,9 @@ def _grow(rng: np.random.Generator, plan: TerrainPlan, coarse: Canvas, levels: P
     """Let grass in from the borders, and weeds into a few places inside; never on roads, tracks, slabs or pits."""
     if plan.grass <= 0.0:
         return
-    inwards_m = np.minimum.outer(*(np.minimum(np.arange(n), np.arange(n)[::-1]) for n in coarse.shape)) / coarse.px_per_m
+    inwards_m = (
+        np.minimum.outer(*(np.minimum(np.arange(n), np.arange(n)[::-1]) for n in coarse.shape)) / coarse.px_per_m
+    )
     rich = 1.0 - inwards_m / (_GRASS_M * plan.grass) + 0.9 * fractal(rng, coarse.shape, 4, 64)
     rich = np.maximum(rich, fractal(rng, coarse.shape, 16, 128) - 3.2 + plan.grass) + 0.8 * fractal(
         rng, coarse.shape, 256, 1024, gain=0.9
@@ -179,11 +180,13 @@ def _grow(rng: np.random.Generator, plan: TerrainPlan, coarse: Canvas, levels: P
     worn = np.zeros(coarse.shape, np.uint8)
     lines = [np.array(path) for path in (*plan.roads, *plan.tracks, *plan.ruts)]
     coarse.draw(worn, lines, 255, 3.2)
-    coarse.fill(worn, [area.outline_m for area in itertools.chain(plan.pits, plan.slabs)], 255)
+    coarse.fill(worn, [*(pit.outline_m for pit in plan.pits), *(slab.outline_m for slab in plan.slabs)], 255)
     rich -= cv2.blur(worn, (9, 9)) * np.float32(2.5 / 255.0)
     mask = cv2.resize(cv2.compare(np.asarray(rich, np.float32), 0.35, cv2.CMP_GT), levels.shape[::-1])
     health = fractal(rng, coarse.shape, 6, 512, gain=0.75)
-    blades = cv2.addWeighted(levels, 0.55, cv2.resize(cv2.convertScaleAbs(health * 30.0 + 96.0), levels.shape[::-1]), 0.6, 0.0)
+    blades = cv2.addWeighted(
+        levels, 0.55, cv2.resize(cv2.convertScaleAbs(health * 30.0 + 96.0), levels.shape[::-1]), 0.6, 0.0
+    )
     green = cv2.applyColorMap(blades, PALETTES["grass" if rng.random() < 0.6 else "dead grass"])
     cv2.copyTo(green, cv2.compare(mask, 127, cv2.CMP_GT), albedo)
 

@@ -10,7 +10,6 @@ from standoff.core.types import ImageArray
 from standoff.simulation.flight import blur_homography
 from standoff.simulation.moment import Body, Moment, scene_at
 from standoff.simulation.render import Renderer
-from standoff.simulation.sensor import Sensor
 from standoff.simulation.site import Site
 from standoff.simulation.truth import IdArray, Row, entity_rows, frame_row, pair_rows
 

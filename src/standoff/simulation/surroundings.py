@@ -1,4 +1,4 @@
-"""What lies beyond the site: streets with parked cars, rows of buildings, trees, fields, skyline; and what shades it."""
+"""What lies beyond the site: streets with parked cars, buildings, trees, fields, skyline; and what shades it."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ from standoff.simulation.vegetation import (
 
 REACH_M = 400.0
 _STREET_M = 8.0
-_CARS = tuple((0.55 * g, 0.55 * g, 0.56 * g) for g in (0.08, 0.3, 0.9, 1.3)) + (
-    (0.16, 0.02, 0.02), (0.03, 0.06, 0.18), (0.5, 0.48, 0.42), (0.1, 0.14, 0.1),
-)  # fmt: skip
+_CARS = tuple(
+    srgb(code) for code in ("#2c2c2e", "#77787b", "#bdbec0", "#dcdcda", "#7a2022", "#2c4770", "#c0bcae", "#5a655a")
+)
 
 
 class Setting(StrEnum):
@@ -267,9 +267,7 @@ def _overgrow(town: _Town, side: _Side) -> None:
             _stand(town, tree(int(rng.integers(TREE_VARIANTS))), side.at(middle_m, float(rng.uniform(-2.0, 3.0))), 0.8)
 
 
-def _plant(
-    town: _Town, mesh_of: Callable[[int], Mesh], variants: int, count: int, away_m: tuple[float, float]
-) -> None:
+def _plant(town: _Town, mesh_of: Callable[[int], Mesh], variants: int, count: int, away_m: tuple[float, float]) -> None:
     """Scatter trees in clumps outside the site, where nothing else is."""
     rng = town.rng
     half = np.array(town.terrain.size_m) / 2

@@ -59,7 +59,7 @@ class Terrain:
         return unit
 
     def _plane(self, xy_m: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Return the triangle under each point: height of its cell's south-west corner, place in the cell, rise a cell."""
+        """Return, for each point, its cell's south-west height, its place in the cell, and the rise across a cell."""
         place = (np.asarray(xy_m, dtype=np.float64).reshape(-1, 2) - self.origin_xy_m) / self.cell_m
         rows, columns = self.height_m.shape
         place = np.clip(place, 0.0, (columns - 1, rows - 1))

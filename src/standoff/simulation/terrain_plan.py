@@ -137,25 +137,8 @@ class TerrainPlan:
     tracks: tuple[Path, ...] = ()
 
     def __post_init__(self) -> None:
-        low, high = _EXTENT_M
-        if not all(low <= side <= high for side in self.extent_m):
-            raise ValueError(f"extent_m must be {low:g} to {high:g} m a side, not {self.extent_m}")
-        if not (0.05 <= self.cell_m <= 2.0 and max(self.extent_m) / self.cell_m <= _CELLS):
-            raise ValueError(f"cell_m must be 0.05 to 2 m and give at most {_CELLS} cells a side, not {self.cell_m}")
-        if not (0.0 <= self.relief_m <= 2.0 and 0.0 <= self.puddles <= 0.2 and self.road_width_m > 0.0):
-            raise ValueError(
-                "relief_m must be 0 to 2 m, puddles 0 to 0.2 and road_width_m positive, "
-                f"not {self.relief_m}, {self.puddles} and {self.road_width_m}"
-            )
-        for name in ("roughness", "moisture", "grass"):
-            if not 0.0 <= getattr(self, name) <= 1.0:
-                raise ValueError(f"{name} must be 0 to 1, not {getattr(self, name)}")
-        for patch in self.patches:
-            if patch.radius_m <= 0.0 or not 0.0 <= patch.firmness <= 1.0 or not self._reaches(patch.centre_m):
-                raise ValueError(f"a patch needs a centre on the terrain, a radius and a firmness of 0 to 1: {patch}")
-        for heap in self.heaps:
-            if not 0.0 < heap.height_m <= _STEEPEST_HEAP * heap.radius_m or not self._reaches(heap.centre_m):
-                raise ValueError(f"a heap must be on the terrain and at most {_STEEPEST_HEAP:g} of its radius high: {heap}")
+        self._check_numbers()
+        self._check_circles()
         for pit in self.pits:
             if pit.depth_m <= 0.0:
                 raise ValueError(f"a pit's depth must be positive, not {pit.depth_m}")
@@ -163,6 +146,28 @@ class TerrainPlan:
             self._check_outline(outline)
         if any(len(path) < 2 for path in (*self.roads, *self.ruts, *self.tracks)):
             raise ValueError("a road, rut or track needs two points or more")
+
+    def _check_numbers(self) -> None:
+        low, high = _EXTENT_M
+        if not all(low <= side <= high for side in self.extent_m):
+            raise ValueError(f"extent_m must be {low:g} to {high:g} m a side, not {self.extent_m}")
+        if not (0.05 <= self.cell_m <= 2.0 and max(self.extent_m) / self.cell_m <= _CELLS):
+            raise ValueError(f"cell_m must be 0.05 to 2 m and give at most {_CELLS} cells a side, not {self.cell_m}")
+        if self.road_width_m <= 0.0:
+            raise ValueError(f"road_width_m must be positive, not {self.road_width_m}")
+        for name, most in {"relief_m": 2.0, "roughness": 1.0, "moisture": 1.0, "puddles": 0.2, "grass": 1.0}.items():
+            if not 0.0 <= getattr(self, name) <= most:
+                raise ValueError(f"{name} must be 0 to {most:g}, not {getattr(self, name)}")
+
+    def _check_circles(self) -> None:
+        for patch in self.patches:
+            if patch.radius_m <= 0.0 or not 0.0 <= patch.firmness <= 1.0 or not self._reaches(patch.centre_m):
+                raise ValueError(f"a patch needs a centre on the terrain, a radius and a firmness of 0 to 1: {patch}")
+        for heap in self.heaps:
+            if not 0.0 < heap.height_m <= _STEEPEST_HEAP * heap.radius_m or not self._reaches(heap.centre_m):
+                raise ValueError(
+                    f"a heap must be on the terrain and at most {_STEEPEST_HEAP:g} of its radius high: {heap}"
+                )
 
     def _reaches(self, point_m: Point) -> bool:
         half = np.array(self.extent_m) / 2

@@ -27,10 +27,11 @@ from standoff.simulation.scene import Batch, Reference
 Row = dict[str, Any]
 IdArray = npt.NDArray[np.uint16]
 
-_SCALARS = (
-    "x_m y_m z_m heading_deg vx_mps vy_mps tip_x_m tip_y_m tip_z_m x1_px y1_px x2_px y2_px "
-    "full_x1_px full_y1_px full_x2_px full_y2_px visible_share foot_x_px foot_y_px"
-).split()
+_SCALARS = [
+    *("x_m", "y_m", "z_m", "heading_deg", "vx_mps", "vy_mps", "tip_x_m", "tip_y_m", "tip_z_m"),
+    *("x1_px", "y1_px", "x2_px", "y2_px", "full_x1_px", "full_y1_px", "full_x2_px", "full_y2_px"),
+    *("visible_share", "foot_x_px", "foot_y_px"),
+]
 _FLOATS = pa.list_(pa.float64())
 
 TRUTH_SCHEMA = pa.schema(

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tolerances import GEOMETRY_REL
 
 from standoff.core.homography import FloatArray
 from standoff.simulation.people.anthropometry import Body
@@ -12,7 +13,6 @@ from standoff.simulation.people.gait import amplitude, arm_swing_deg, footing, s
 from standoff.simulation.people.skeleton import Stance, hanging_wrists, reach, stand
 from standoff.simulation.people.worker import Worker, make_worker
 from standoff.simulation.scene import Batch
-from tolerances import GEOMETRY_REL
 
 ALLOWED_SLIP = 0.1
 """Of the step, as the site's interface promises."""
@@ -54,11 +54,11 @@ def test_a_cycle_later_the_body_is_the_same(phase: float, speed_mps: float) -> N
         np.testing.assert_allclose(later[name], place_m, atol=1e-7, err_msg=name)
 
 
-@pytest.mark.parametrize("seed", range(6))
-@pytest.mark.parametrize("speed_mps", [0.6, 1.3, 2.0])
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("speed_mps", [0.6, 1.8])
 def test_what_touches_the_ground_does_not_slide(seed: int, speed_mps: float) -> None:
     person = make_worker(np.random.default_rng(seed))
-    walked_m = np.linspace(0.0, 2.0 * person.step_m, 241)
+    walked_m = np.linspace(0.0, 2.0 * person.step_m, 161)
     slid_m = np.zeros(2)
     before = None
     for distance_m in walked_m:

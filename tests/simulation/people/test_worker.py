@@ -5,8 +5,9 @@ from collections.abc import Mapping
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from tolerances import FOOT_ON_GROUND_M
 
 from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.homography import FloatArray
@@ -14,7 +15,6 @@ from standoff.simulation.people.carried import LOADS
 from standoff.simulation.people.outfit import choose_outfit
 from standoff.simulation.people.worker import JOINTS, Worker, make_worker
 from standoff.simulation.scene import Batch
-from tolerances import FOOT_ON_GROUND_M
 
 UPRIGHT: Mapping[str, float] = {}
 
@@ -38,26 +38,30 @@ def triangles(batches: tuple[Batch, ...]) -> int:
 
 
 def joint_values() -> st.SearchStrategy[dict[str, float]]:
+    """Draw joints from all of their ranges, the ends as often as the middle: what goes wrong goes wrong there."""
     bounds = {name: (-50.0, 50.0) if name == "stride_m" else JOINTS[name] for name in JOINTS}
-    return st.fixed_dictionaries({name: st.floats(low, high) for name, (low, high) in bounds.items()})
+    return st.fixed_dictionaries(
+        {name: st.one_of(st.sampled_from([low, high]), st.floats(low, high)) for name, (low, high) in bounds.items()}
+    )
 
 
 @settings(max_examples=150, deadline=None)
 @given(seed=st.integers(0, 40), joints=joint_values())
+@example(seed=16, joints={"bend_deg": 95.0, "crouch": 1.0, "arms": 0.1, "turn_deg": -60.0})
 def test_the_lowest_foot_is_on_the_ground_whatever_the_joints(seed: int, joints: dict[str, float]) -> None:
     person = worker(seed)
     lowest_m = cloud(person.person(joints))[:, 2].min()
     assert abs(lowest_m) < FOOT_ON_GROUND_M
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(seed=st.integers(0, 60), joints=joint_values())
 def test_nothing_that_is_carried_is_below_the_ground(seed: int, joints: dict[str, float]) -> None:
     belongings = worker(seed).belongings({**joints, "arms": 1.0})
     assert all(vertices(batch)[:, 2].min() > -0.06 for batch in belongings)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(seed=st.integers(0, 40), joints=joint_values())
 def test_no_joint_value_tears_a_body_apart(seed: int, joints: dict[str, float]) -> None:
     person = worker(seed)

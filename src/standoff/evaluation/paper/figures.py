@@ -102,7 +102,7 @@ def _draw_residuals(axes: Axes, series: PairSeries) -> None:
     axes.axhline(0.0, color=MUTED, linewidth=0.8)
     axes.set_xticks(range(len(spreads)), [name for name, _, _ in spreads])
     axes.set_xlim(-0.6, len(spreads) - 0.4)
-    axes.set_title("less truth, m", loc="left", fontsize=9)
+    axes.set_title("error, m", loc="left", fontsize=9)
     axes.grid(True, axis="y")
 
 

@@ -55,7 +55,7 @@ class Snapshots:
     def take_failure(self, frame: Frame, true_px: FloatArray, ground: GroundMap | None, reason: str) -> None:
         """Offer a frame without a map or with a wrong one."""
         if reason not in self.failures and len(self.failures) < _MOST_FAILURES:
-            crop = crop_of_reference(frame.image, true_px, None if ground is None else ground.anchors_px)
+            crop = crop_of_reference(frame, true_px, None if ground is None else ground.anchors_px)
             if crop is not None:
                 self.failures[reason] = Snapshot(frame.index, reason, _jpeg(crop))
 
@@ -79,15 +79,15 @@ class Snapshots:
         if self._good is None:
             return None
         frame, true_px, ground = self._good
-        crop = crop_of_reference(frame.image, true_px, ground.anchors_px)
+        crop = crop_of_reference(frame, true_px, ground.anchors_px)
         return None if crop is None else Snapshot(frame.index, "the outline that was found", _jpeg(crop))
 
 
-def crop_of_reference(image: ImageArray, true_px: FloatArray, found_px: FloatArray | None) -> ImageArray | None:
+def crop_of_reference(frame: Frame, true_px: FloatArray, found_px: FloatArray | None) -> ImageArray | None:
     """Cut the reference out of a picture and draw the true outline on it, and the found one over it.
 
     Args:
-        image: (H, W, 3) BGR.
+        frame: Its pixels are converted only where the reference is in the picture.
         true_px: (4, 2) corners.
         found_px: (4, 2) corners, or None where none were found.
 
@@ -97,13 +97,12 @@ def crop_of_reference(image: ImageArray, true_px: FloatArray, found_px: FloatArr
     if not np.isfinite(true_px).all():
         return None
     centre, half = true_px.mean(axis=0), np.ptp(true_px, axis=0).max() * (0.5 + _MARGIN / 2.0)
-    height, width = image.shape[:2]
-    if (centre + half < 0).any() or (centre - half > (width, height)).any():
+    if (centre + half < 0).any() or (centre - half > frame.size_px).any():
         return None
     scale = min(_CROP_PX) / (2.0 * half)
     to_crop = np.array([[scale, 0.0, 0.0], [0.0, scale, 0.0]])
     to_crop[:, 2] = np.array(_CROP_PX) / 2.0 - scale * centre
-    crop = cv2.warpAffine(image, to_crop, _CROP_PX, flags=cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR)
+    crop = cv2.warpAffine(frame.image, to_crop, _CROP_PX, flags=cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR)
     _outline(crop, true_px @ to_crop[:, :2].T + to_crop[:, 2], "worker", thickness=1)
     if found_px is not None:
         _outline(crop, found_px @ to_crop[:, :2].T + to_crop[:, 2], "danger", thickness=1)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from standoff.config import Settings, build_stage, load_settings
 from standoff.core.errors import DataError
@@ -31,7 +31,7 @@ class Trial:
     """
 
     method: ReferenceMethod = "paper"
-    detector: str | Path = "truth"
+    detector: Literal["truth", "noisy"] | Path = "truth"
     anchor: Anchor | None = None
     box_error: BoxError = field(default_factory=BoxError)
     seed: int = 0

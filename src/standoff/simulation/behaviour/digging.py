@@ -18,6 +18,8 @@ RATES_PS = MappingProxyType({"swing_deg": 55.0, "boom_deg": 30.0, "arm_deg": 45.
 
 _CYCLE_S = (15.0, 20.0)  # of loading trucks at 90 deg swing, as production handbooks have it
 _BUCKETS_A_TRUCK = (5, 8)
+_OVER_BED_M = 0.9  # of the open bucket's edge, which dips a little as it opens
+_BED_M = -1.2  # middle of a truck's bed, ahead of its middle
 
 Cycle = Callable[[], list[Stance]]
 
@@ -38,12 +40,13 @@ def truck_loading(
     Returns:
         Motions of excavator and truck.
     """
-    reach_m = float(np.hypot(*(truck_place.xy_m - place.xy_m)))
-    swing_deg = _near_zero(excavator, float(np.rad2deg(place.bearing_to(truck_place.xy_m))))
+    bed_m = truck_place.moved(_BED_M).xy_m
+    reach_m = float(np.hypot(*(bed_m - place.xy_m)))
+    swing_deg = _near_zero(excavator, float(np.rad2deg(place.bearing_to(bed_m))))
     arm = ExcavatorArm(excavator)
     motion, emptied_s = _cycles(
         rng, excavator, place, duration_s,
-        lambda: _dig(rng, arm, 0.0) + _empty(rng, arm, swing_deg, reach_m, truck.height_m + 0.5),
+        lambda: _dig(rng, arm, 0.0) + _empty(rng, arm, swing_deg, reach_m, truck.height_m + _OVER_BED_M),
     )  # fmt: skip
     return motion, _filling(rng, truck, truck_place, duration_s, emptied_s)
 

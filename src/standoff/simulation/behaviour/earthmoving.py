@@ -29,6 +29,7 @@ _LIFT_DPS, _BUCKET_DPS, _BED_DPS, _BLADE_MPS = 36.0, 95.0, 9.0, 0.5
 
 _BACK_OFFS_M = (4.0, 5.5, 7.0, 9.0, 11.0, 14.0)  # of a loader from pile and truck, more than half its length
 _BUCKETS_A_TRUCK = 4
+_BED_M = -1.2  # middle of a truck's bed, ahead of its middle
 
 Round = Callable[[Place], Motion]
 
@@ -82,7 +83,7 @@ def _dump_place(loader: Model, truck: Model, pile: Place, truck_place: Place) ->
     """Return where the loader's middle is when its bucket is over the truck, on the pile's side of it."""
     side = 1.0 if np.sin(truck_place.bearing_to(pile.xy_m)) > 0 else -1.0
     away_m = float(np.ptp(truck.footprint_m[:, 1]) / 2 + np.ptp(loader.footprint_m[:, 0]) / 2 + 0.9)
-    return truck_place.moved(-0.5, side * away_m, -side * np.pi / 2)
+    return truck_place.moved(_BED_M, side * away_m, -side * np.pi / 2)
 
 
 def _apex(loader: Model, pile: Place, dump: Place) -> Place:
@@ -110,7 +111,7 @@ def _loading_keys(arms: LoaderArms, ends_s: Sequence[float], whole_s: float) -> 
     return {
         "lift_deg": [
             (0.0, carried), (at_pile - 1.0, arms.low_deg), (at_pile, arms.low_deg), (dug, carried), (raised_s, carried),
-            (at_truck, arms.high_deg), (dumped, arms.high_deg), (whole_s, carried),
+            (at_truck, arms.high_deg), (min(dumped + 1.5, whole_s - 3.0), arms.high_deg), (whole_s, carried),
         ],
         "bucket_deg": [
             (0.0, arms.level_deg), (at_pile + 0.8, arms.level_deg), (dug, arms.curled_deg),

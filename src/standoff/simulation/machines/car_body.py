@@ -49,7 +49,7 @@ SEDAN = CarPlan(4.7, 1.82, 1.46, (1.4, -1.35), 0.33, 0.88, 0.98, (0.95, -1.75), 
 HATCHBACK = CarPlan(4.15, 1.76, 1.48, (1.28, -1.27), 0.32, 0.9, 0.96, (0.85, -2.0), (0.2, -1.5))
 ESTATE = CarPlan(4.75, 1.82, 1.5, (1.42, -1.35), 0.33, 0.9, 0.98, (0.95, -2.3), (0.25, -1.95))
 SUV = CarPlan(4.6, 1.88, 1.74, (1.38, -1.32), 0.37, 1.06, 1.1, (0.9, -2.2), (0.3, -1.85), 0.76)
-VAN = CarPlan(5.5, 2.0, 2.35, (1.85, -1.7), 0.36, 1.12, 1.2, (1.85, -2.72), (1.05, -2.68), 0.9, False)
+VAN = CarPlan(5.5, 2.0, 2.28, (1.85, -1.7), 0.36, 1.12, 1.2, (1.85, -2.72), (1.05, -2.68), 0.9, False)
 SMALL_VAN = CarPlan(4.5, 1.85, 1.85, (1.38, -1.4), 0.33, 1.02, 1.1, (1.15, -2.2), (0.55, -2.15), 0.86, False)
 MINIBUS = CarPlan(5.3, 1.98, 1.98, (1.75, -1.5), 0.35, 1.1, 1.12, (1.8, -2.6), (1.0, -2.5), 0.86)
 PICKUP = CarPlan(5.3, 1.88, 1.8, (1.62, -1.55), 0.39, 1.08, 1.08, (1.0, -0.85), (0.45, -0.65), 0.76)
@@ -146,9 +146,9 @@ def _glass_house(plan: CarPlan) -> list[Mesh]:
 
 def _arches(plan: CarPlan) -> list[Mesh]:
     dark = srgb("#121212")
-    arch = cylinder(plan.wheel_m + 0.06, 0.3, dark, Surface.PLASTIC, axis="y", sections=14)
+    arch = cylinder(plan.wheel_m + 0.05, 0.3, dark, Surface.PLASTIC, axis="y", sections=14)
     reach_m = plan.width_m / 2 - 0.154
-    return [arch.at(x, s * reach_m, plan.wheel_m + 0.02) for x in plan.axles_m for s in (-1.0, 1.0)]
+    return [arch.at(x, s * reach_m, plan.wheel_m + 0.06) for x in plan.axles_m for s in (-1.0, 1.0)]
 
 
 def _details(plan: CarPlan) -> list[Mesh]:
@@ -179,5 +179,5 @@ def _load_bed(plan: CarPlan) -> list[Mesh]:
 
 def wheel_places(plan: CarPlan) -> FloatArray:
     """Return (4, 3) wheel centres, front right first."""
-    y_m = plan.width_m / 2 - 0.075
+    y_m = plan.width_m / 2 - 0.06
     return np.array([[x, s * y_m, plan.wheel_m] for x in plan.axles_m for s in (-1.0, 1.0)])

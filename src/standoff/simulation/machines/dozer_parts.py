@@ -27,9 +27,9 @@ CRAWLER = Crawler(length_m=3.5, height_m=1.02, width_m=0.56, shoes=38)
 GAUGE_M = 1.88
 BLADE_PIVOT_M: Point = (-0.2, 0.0, 0.5)
 BLADE_EDGE_M: Point = (2.72, 0.0, 0.0)
-RAM_FOOT_M: Point = (1.55, 0.0, 1.45)
-RAM_HEAD_M: Point = (2.3, 0.0, 0.45)
-RAM_Y_M = 0.55
+RAM_FOOT_M: Point = (1.2, 0.0, 1.75)
+RAM_HEAD_M: Point = (2.25, 0.0, 0.3)
+RAM_Y_M = 0.58
 _BLADE_WIDTH_M = 3.25
 
 
@@ -114,7 +114,7 @@ def track_frame() -> Mesh:
 @lru_cache(maxsize=1)
 def blade_ram() -> Ram:
     """Return one lifting cylinder."""
-    return Ram.spanning(0.75, 1.7, 0.065)
+    return Ram.spanning(1.08, 2.06, 0.065)
 
 
 @lru_cache(maxsize=1)

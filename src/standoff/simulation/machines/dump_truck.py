@@ -16,7 +16,7 @@ from standoff.core.homography import FloatArray
 from standoff.simulation.machines import hauler
 from standoff.simulation.machines.joints import UNBOUNDED_M, settle
 from standoff.simulation.machines.lorry import FOUR_AXLES, FRAME_TOP_M, THREE_AXLES, WIDTH_M, Lorry, make_lorry
-from standoff.simulation.machines.machine_parts import rectangle
+from standoff.simulation.machines.machine_parts import highest_m, rectangle
 from standoff.simulation.machines.paint import Painted, draw_livery, weather
 from standoff.simulation.machines.road_wheels import RoadWheels, axle_places, road_wheel
 from standoff.simulation.machines.tipping_bed import LOAD_VARIANTS, Bed, cargo, hauler_tub, tipper_gate, tipper_tub
@@ -43,7 +43,7 @@ class Tipper:
         lorry: What carries the bed.
         bed: Tips backwards.
         footprint_m: Its plan.
-        height_m: Of the cab or the bed's front wall.
+        height_m: Of the cab or the bed, whichever is higher.
         joints: As of all dump trucks.
         class_id: Dump truck.
     """
@@ -139,7 +139,7 @@ def _make_tipper(rng: np.random.Generator) -> Tipper:
         ram_m=((length_m - 0.5, 0.0, -0.4), (length_m - 0.15, 0.0, 0.1)),
         ram_sides_m=(0.0,),
     )
-    height_m = max(lorry.height_m, floor_m + wall_m + 0.25)
+    height_m = max(lorry.height_m, highest_m(bed.batches(0.0, 0.0, np.eye(4))))
     footprint_m = rectangle(plan.length_m, WIDTH_M)
     return Tipper(lorry, bed, footprint_m, height_m, LIMITS)
 
@@ -175,7 +175,7 @@ def _make_hauler(rng: np.random.Generator) -> Hauler:
         rear_wheels=RoadWheels(rims, hauler.WHEEL_RADIUS_M, rear_places, np.zeros(4)),
         bed=bed,
         footprint_m=rectangle(hauler.LENGTH_M * scale, hauler.WIDTH_M * scale),
-        height_m=hauler.HEIGHT_M * scale,
+        height_m=scale * float(hauler.front_body().vertices_m[:, 2].max()),
         joints=LIMITS,
     )
 

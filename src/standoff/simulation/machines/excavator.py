@@ -165,11 +165,11 @@ def finished(model: Excavator) -> Excavator:
 
 def rest_of(linkage: DiggingArm) -> dict[str, float]:
     """Return the joints of a parked machine: its teeth on the ground some way ahead."""
-    attitude_deg = -112.0
-    down_m = linkage.foot_m[2] + linkage.bucket_m * np.sin(np.deg2rad(attitude_deg))
-    ahead_m = np.sqrt((0.95 * (linkage.boom_m + linkage.arm_m)) ** 2 - down_m**2)
+    attitude_deg, height_m = -112.0, 0.02
+    down_m = linkage.foot_m[2] - height_m + linkage.bucket_m * np.sin(np.deg2rad(attitude_deg))
+    ahead_m = np.sqrt((0.96 * (linkage.boom_m + linkage.arm_m)) ** 2 - down_m**2)
     radius_m = linkage.foot_m[0] + ahead_m + linkage.bucket_m * np.cos(np.deg2rad(attitude_deg))
-    return linkage.solve(float(radius_m), 0.0, attitude_deg)
+    return linkage.solve(float(radius_m), height_m, attitude_deg)
 
 
 def _paint(size: ExcavatorSize, livery: Livery, rng: np.random.Generator) -> dict[Link, tuple[Painted, ...]]:

@@ -183,11 +183,12 @@ def ram_mounts(size: ExcavatorSize, limits: tuple[tuple[str, tuple[float, float]
     """Build boom, arm and bucket cylinders, each as long as the joints' limits ask for."""
     linkage = linkage_of(size)
     boom_depth_m, arm_depth_m = min(size.boom_m, 6.4), min(size.arm_m, 3.2)
-    x_m, y_m, _ = linkage.foot_m
+    x_m, y_m, z_m = linkage.foot_m
     beside_m = size.boom_width_m / 2 + 0.1
     stout_m = 0.05 + 0.008 * boom_depth_m
+    low_m = 0.105 * boom_depth_m
     plans = (
-        (Link.UPPER, (x_m + 0.62, y_m, size.deck_m + 0.16), Link.BOOM, (0.40 * size.boom_m, 0.0, 0.16 * boom_depth_m),
+        (Link.UPPER, (x_m + low_m, y_m, z_m - low_m), Link.BOOM, (0.40 * size.boom_m, 0.0, 0.16 * boom_depth_m),
          (-beside_m, beside_m)),
         (Link.BOOM, (0.425 * size.boom_m, 0.0, 0.255 * boom_depth_m), Link.ARM,
          (-0.265 * arm_depth_m, 0.0, 0.045 * arm_depth_m), (0.0,)),

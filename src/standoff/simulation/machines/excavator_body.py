@@ -177,9 +177,7 @@ def _counterweight(size: ExcavatorSize) -> Mesh:
     chamfer_m = 0.2 if size.rounded else 0.07
     body = moulded(outline, bottom_m + 0.12, top_m, chamfer_m, None)
     belly = moulded([(0.96 * x_m, 0.95 * y_m) for x_m, y_m in outline], bottom_m, bottom_m + 0.2, 0.02, None)
-    extras = [
-        box((0.16, 0.05, 0.12), None).at(-0.82 * tail_m, side * 0.5 * half_m, top_m - 0.03) for side in (-1, 1)
-    ]
+    extras = [box((0.16, 0.05, 0.12), None).at(-0.82 * tail_m, side * 0.5 * half_m, top_m - 0.03) for side in (-1, 1)]
     if not size.rounded:
         red = box((0.04, 0.22, 0.1), RED_LAMP, Surface.GLASS)
         extras += [red.at(-0.965 * tail_m, side * 0.7 * half_m, bottom_m + 0.3) for side in (-1, 1)]

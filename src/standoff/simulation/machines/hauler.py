@@ -30,7 +30,6 @@ REAR_AXLES_X_M = (-1.75, -3.5)
 TRACK_M = 2.2
 LENGTH_M = 10.25
 WIDTH_M = TRACK_M + WHEEL_WIDTH_M
-HEIGHT_M = 3.8
 
 
 @lru_cache(maxsize=1)

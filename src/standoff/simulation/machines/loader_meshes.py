@@ -90,6 +90,16 @@ class LoaderSize:
         return 0.2 * self.k
 
     @property
+    def crank_m(self) -> tuple[float, float]:
+        """Return the lengths of the tilt crank above and below its pivot."""
+        return 0.72 * self.k, 0.70 * self.k
+
+    @property
+    def tie_m(self) -> float:
+        """Return the length of the bar from the crank to the bucket."""
+        return 0.82 * self.k
+
+    @property
     def ear_xz_m(self) -> tuple[float, float]:
         """Return where the tie holds the bucket, bucket's frame."""
         return _EAR_XZ[0] * self.k, _EAR_XZ[1] * self.k
@@ -132,9 +142,9 @@ def loader_meshes(size: LoaderSize) -> LoaderMeshes:
         front_frame=_front_frame(size),
         wheel=wheel(size.tyre_m / 2, size.tyre_width_m, None, lugs=16, sections=18, rim=0.5),
         arms=_arms(size),
-        crank=profile([(-0.72 * k, -0.09), (-0.72 * k, 0.09), (0.0, 0.2 * k), (0.68 * k, 0.09), (0.68 * k, -0.09),
-                       (0.0, -0.14 * k)], 0.16, None),
-        tie=beam((0.0, 0.0, 0.0), (0.58 * k, 0.0, 0.0), (0.2, 0.12), None),
+        crank=profile([(-size.crank_m[0], -0.09), (-size.crank_m[0], 0.09), (0.0, 0.2 * k), (size.crank_m[1], 0.09),
+                       (size.crank_m[1], -0.09), (0.0, -0.14 * k)], 0.16, None),
+        tie=beam((0.0, 0.0, 0.0), (size.tie_m, 0.0, 0.0), (0.2, 0.12), None),
         bucket=_bucket(size),
         soil=_soil(size),
     )  # fmt: skip

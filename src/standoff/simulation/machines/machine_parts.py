@@ -309,7 +309,9 @@ class Ram:
 
     @classmethod
     def spanning(cls, shortest_m: float, longest_m: float, radius_m: float) -> Ram:
-        """Build one whose pivots come as near as `shortest_m` and part as far as `longest_m`."""
+        """Build one whose pivots come as near as `shortest_m` and part as far as `longest_m`, less than twice that."""
+        if longest_m > 1.94 * shortest_m:
+            raise ValueError(f"no cylinder spans {shortest_m:.2f} to {longest_m:.2f} m")
         barrel_m = min(0.6 * longest_m, 0.97 * shortest_m)
         rod_m = min(longest_m - barrel_m + 0.05, 0.97 * shortest_m)
         eye = cylinder(1.1 * radius_m, 2.4 * radius_m, None, axis="y", sections=8)

@@ -34,7 +34,7 @@ BUDGET = 12_000
 """Triangles of all parts; finer meshes are thinned out."""
 
 _PAINT = -1
-_CELLS_M = (1e-4, 0.015, 0.02, 0.03, 0.04, 0.055, 0.07, 0.1)
+_CELLS_M = (1e-4, 0.015, 0.02, 0.03, 0.04, 0.055, 0.075, 0.1, 0.14, 0.2)
 _PAINT_HUE = (6, 28)
 """OpenCV's hue, 0..179: red-orange to yellow."""
 _UNREADABLE = (
@@ -199,7 +199,9 @@ def _assemble(paths: tuple[Path, ...], texture: Path, layout: MeshLayout, stamps
         arm_y_m=layout.arm_m[1],
         bucket_y_m=layout.bucket_m[1],
     )
-    cell_m = next((cell for cell in _CELLS_M if sum(_count(soup, cell) for soup in soups.values()) <= BUDGET), 0.1)
+    cell_m = next(
+        (cell for cell in _CELLS_M if sum(_count(soup, cell) for soup in soups.values()) <= BUDGET), _CELLS_M[-1]
+    )
     meshes = {link: _mesh(soups[part], cell_m).moved(pose) for part, (link, pose) in into_link.items()}
     width_m = np.ptp(soups["bucket"].corners_m[..., 1])
     meshes[Link.ROCKER] = join(
@@ -264,11 +266,14 @@ def _read(path: Path, image: npt.NDArray[np.uint8] | None) -> _Soup:
 
 def _face_colour(piece: trimesh.Trimesh, image: npt.NDArray[np.uint8] | None) -> npt.NDArray[np.uint8]:
     """Return (T, 3) RGB: the texture in the middle of each face, else the file's own colours."""
-    uv = getattr(piece.visual, "uv", None)
+    visual = piece.visual
+    uv, material = getattr(visual, "uv", None), getattr(visual, "material", None)
     if image is None or uv is None:
-        colours: npt.NDArray[np.uint8] = np.asarray(piece.visual.to_color().face_colors if uv is not None
-                                                    else piece.visual.face_colors)[:, :3]  # fmt: skip
-        return colours
+        if material is None:
+            own = visual.face_colors
+        else:
+            own = material.main_color if uv is None else visual.to_color().face_colors
+        return np.broadcast_to(np.asarray(own, dtype=np.uint8)[..., :3], (len(piece.faces), 3))
     middle = np.asarray(uv)[piece.faces].mean(axis=1) % 1.0
     height_px, width_px = image.shape[:2]
     column = np.minimum((middle[:, 0] * width_px).astype(int), width_px - 1)

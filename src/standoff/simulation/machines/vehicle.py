@@ -17,7 +17,7 @@ from standoff.simulation.machines.car_body import CarPlan, wheel_places
 from standoff.simulation.machines.joints import UNBOUNDED_DEG, UNBOUNDED_M, settle
 from standoff.simulation.machines.lorry import FOUR_AXLES, TWO_AXLES, WIDTH_M, Lorry, make_lorry
 from standoff.simulation.machines.lorry_bodies import MIXER_AXIS, flatbed, mixer_drum, mixer_frame
-from standoff.simulation.machines.machine_parts import rectangle
+from standoff.simulation.machines.machine_parts import highest_m, rectangle
 from standoff.simulation.machines.paint import Painted, weather
 from standoff.simulation.machines.road_wheels import RoadWheels, road_wheel
 from standoff.simulation.mesh import Colour, rotation, scaling, srgb
@@ -48,6 +48,7 @@ _CARS: tuple[tuple[CarPlan, float], ...] = (
     (car_body.MINIBUS, 0.06),
     (car_body.PICKUP, 0.15),
 )
+_BODIES = ("#d8d8d4", "#8f9397", "#b33a22", "#2a5a96", "#d8a020", "#4c7a50")
 _LORRY_SHARE = 0.14
 _WORKING = (car_body.VAN, car_body.SMALL_VAN, car_body.PICKUP)
 
@@ -99,7 +100,7 @@ class Truck:
     """
 
     lorry: Lorry
-    body: tuple[Painted, ...]
+    body: Painted
     drum: Painted | None
     footprint_m: FloatArray
     height_m: float
@@ -109,10 +110,7 @@ class Truck:
     def parts(self, joints: Mapping[str, float]) -> tuple[Batch, ...]:
         """Return lorry, body and drum."""
         value = settle(joints, self.joints, {})
-        batches = (
-            *self.lorry.batches(value["travel_m"], value["steer_deg"]),
-            *(part.at(np.eye(4)) for part in self.body),
-        )
+        batches = (*self.lorry.batches(value["travel_m"], value["steer_deg"]), self.body.at(np.eye(4)))
         if self.drum is None:
             return batches
         return (*batches, self.drum.at(MIXER_AXIS @ rotation("x", value["drum_deg"])))
@@ -133,7 +131,7 @@ def make_car(rng: np.random.Generator) -> Car:
     working = plan in _WORKING
     extras = int(rng.choice([0, 0, 0, 1, 2])) if working else 0
     scale, dust = float(rng.uniform(0.95, 1.05)), float(rng.uniform(0.0, 0.45 if working else 0.25))
-    tyre = Painted(road_wheel(plan.wheel_m, 0.22), weather(rng, srgb("#9a9c9e")), dust)
+    tyre = Painted(road_wheel(plan.wheel_m, 0.2), weather(rng, srgb("#9a9c9e")), dust)
     body = car_body.car_body(plan, extras)
     return Car(
         scale=scale,
@@ -150,15 +148,17 @@ def make_truck(rng: np.random.Generator) -> Truck:
     mixer = rng.random() < 0.5
     plan = FOUR_AXLES if mixer else TWO_AXLES
     lorry, dust = make_lorry(rng, plan), float(rng.uniform(0.15, 0.6))
-    fixed = mixer_frame() if mixer else flatbed(int(rng.integers(3)))
-    tint = weather(rng, srgb(str(rng.choice(["#d8d8d4", "#8f9397", "#b33a22", "#2a5a96", "#d8a020", "#4c7a50"]))))
+    tint = weather(rng, srgb(_BODIES[int(rng.integers(len(_BODIES)))]))
+    frame = weather(rng, srgb("#3a3b3c")) if mixer else tint
+    body = Painted(mixer_frame() if mixer else flatbed(int(rng.integers(3))), frame, dust)
     drum = Painted(mixer_drum(int(rng.integers(3))), tint, dust) if mixer else None
+    standing = (body.at(np.eye(4)), *(() if drum is None else (drum.at(MIXER_AXIS),)))
     return Truck(
         lorry=lorry,
-        body=(Painted(fixed, weather(rng, srgb("#3a3b3c")) if mixer else tint, dust),),
+        body=body,
         drum=drum,
         footprint_m=rectangle(plan.length_m, WIDTH_M),
-        height_m=max(lorry.height_m, 3.75 if mixer else 0.0),
+        height_m=max(lorry.height_m, highest_m(standing)),
         joints={**LIMITS, "drum_deg": UNBOUNDED_DEG} if mixer else LIMITS,
     )
 

@@ -97,14 +97,16 @@ class WheelLoader:
         meshes, livery, size = self.meshes, self.colours.livery, self.size
         front = rotation("z", joints["steer_deg"] / 2)
         arms, bucket = arm_and_bucket_poses(size, joints)
-        knuckle, crank_top, crank_end, ear = crank_points_m(size, joints)
+        crank_pivot, crank_top, crank_end, ear = crank_points_m(size, joints)
+        crank = strut_pose(crank_top, crank_end)
+        crank[:3, 3] = crank_pivot
         lift_ram, tilt_ram = loader_rams(size)
         lift_barrels, lift_rods = zip(*(ram_poses(*ends) for ends in lift_pivots_m(size, joints)), strict=True)
         tilt_barrel, tilt_rod = ram_poses(tilt_pivot_m(size), crank_top)
         dust = livery.dust
         batches = [
             Painted(meshes.arms, livery.boom, dust).at(front @ arms),
-            Painted(meshes.crank, livery.boom, dust).at(front @ translation(*(knuckle)) @ _level(crank_top, crank_end)),
+            Painted(meshes.crank, livery.boom, dust).at(front @ crank),
             Painted(meshes.tie, livery.boom, dust).at(front @ strut_pose(crank_end, ear)),
             Painted(meshes.bucket, livery.tool, max(dust, 0.5)).at(front @ bucket),
             Painted(lift_ram.barrel, livery.boom, dust).at(front @ np.stack(lift_barrels)),
@@ -128,12 +130,6 @@ class WheelLoader:
         return scaled
 
 
-def _level(from_m: FloatArray, to_m: FloatArray) -> FloatArray:
-    pose = strut_pose(from_m, to_m)
-    pose[:3, 3] = 0.0
-    return pose
-
-
 def arm_and_bucket_poses(size: LoaderSize, joints: Mapping[str, float]) -> tuple[FloatArray, FloatArray]:
     """Return the (4, 4) poses of lift arms and bucket in the front half's frame."""
     pivot_x_m, pivot_z_m = size.pivot_xz_m
@@ -151,8 +147,8 @@ def crank_points_m(
     pivot = (arms @ [1.40 * k, 0.0, 0.5 * k, 1.0])[:3]
     ear = (bucket @ [size.ear_xz_m[0], 0.0, size.ear_xz_m[1], 1.0])[:3]
     # The lower end hangs below the line to the ear.
-    end = knee_m(ear, pivot, 0.58 * k, 0.68 * k)
-    return pivot, pivot - (end - pivot) * 0.72 / 0.68, end, ear
+    end = knee_m(ear, pivot, size.tie_m, size.crank_m[1])
+    return pivot, pivot - (end - pivot) * size.crank_m[0] / size.crank_m[1], end, ear
 
 
 def tilt_pivot_m(size: LoaderSize) -> FloatArray:

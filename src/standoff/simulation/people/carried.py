@@ -103,7 +103,7 @@ def hold_shouldered(bearer: Bearer) -> Grip:
     over_m = bearer.shoulders_m[1] + bearer.heading @ np.array([0.02, 0.045, 0.0]) + [0.0, 0.0, 0.07]
     low_m = bearer.at_chest(0.20, 0.0, 0.02)
     low_m[2] = max(low_m[2], _LAID_M)
-    lowered = ease((_lean_deg(bearer) - 28.0) / 20.0)
+    lowered = ease((_lean_deg(bearer) - 14.0) / 12.0)
     middle_m = over_m + lowered * (low_m - over_m)
     pose = bearer.upright(middle_m) @ rotation("z", -4.0 + 94.0 * lowered) @ rotation("y", -5.0 * (1.0 - lowered))
     aside_m = bearer.heading @ np.array([-0.06, 0.22, 0.06])

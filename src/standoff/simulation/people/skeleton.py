@@ -81,7 +81,8 @@ def stand(body: Body, stance: Stance, sole: Sole) -> Trunk:
     thighs, shins = _legs(body, hips_m, ankles_m, crouch)
 
     trunk_m = body.stature_m * body.trunk_share
-    lean_deg = min(stance.bend_deg + 25.0 * crouch + 3.0 * stance.walk, max(stance.bend_deg, 95.0))
+    # Nobody squats with a level back: the elbows of a turned trunk would be in the ground.
+    lean_deg = min(stance.bend_deg + 25.0 * crouch + 3.0 * stance.walk, 95.0 - 22.0 * stance.crouch)
     pelvis = translation(*hips_m.mean(axis=0)) @ rotation("z", pelvis_yaw_deg) @ rotation("y", 0.6 * lean_deg)
     chest_yaw_deg = 1.2 * stance.turn_deg - 1.8 * pelvis_yaw_deg
     chest = pelvis @ translation(0.0, 0.0, (ratio.WAIST_HEIGHT - ratio.HIP_HEIGHT) * trunk_m)
@@ -131,7 +132,11 @@ def _feet(body: Body, stance: Stance, sole: Sole) -> tuple[FloatArray, FloatArra
         turn = rotation("z", side * stance.toes_out_deg * (1.0 + 2.0 * outwards))
         # The sole rolls along the foot, which does not point straight ahead.
         ankles_m[i] = foot.rolled_m * (turn[:3, 0] - [1.0, 0.0, 0.0])
-        ankles_m[i] += foot.x_m + side * stance.ahead_m * still / 2, side * (stance.feet_apart_m + 0.05 * outwards), foot.z_m
+        ankles_m[i] += (
+            foot.x_m + side * stance.ahead_m * still / 2,
+            side * (stance.feet_apart_m + 0.05 * outwards),
+            foot.z_m,
+        )
         boots[i] = translation(*ankles_m[i]) @ turn @ rotation("y", -foot.pitch_deg) @ scaling(*(body.scale,) * 3)
     return ankles_m, boots
 

@@ -17,10 +17,10 @@ from standoff.simulation.people.dressing import worn
 from standoff.simulation.people.gait import ease, step_length_m
 from standoff.simulation.people.outfit import Outfit, choose_outfit
 from standoff.simulation.people.skeleton import Stance, hanging_wrists, reach, stand
-from standoff.simulation.scene import Batch, place
+from standoff.simulation.scene import CARRIED, Batch, place
 
 JOINTS: Mapping[str, tuple[float, float]] = {
-    "stride_m": (-np.inf, np.inf),
+    "stride_m": (-1e5, 1e5),
     "speed_mps": (0.0, 2.5),
     "bend_deg": (0.0, 95.0),
     "crouch": (0.0, 1.0),
@@ -126,8 +126,9 @@ class Worker:
         """Return what is carried or worked with; nothing while `arms` is 0.5 or less."""
         return self._burdened(self._posture(joints))
 
-    def tool_tip_m(self, joints: Mapping[str, float]) -> None:
+    def tool_tip_m(self, joints: Mapping[str, float]) -> FloatArray | None:
         """Return None: people have no bucket."""
+        return None
 
     def _posture(self, joints: Mapping[str, float]) -> _Posture:
         values = {name: min(max(joints.get(name, 0.0), low), high) for name, (low, high) in self.joints.items()}
@@ -174,7 +175,7 @@ class Worker:
     def _burdened(self, posture: _Posture) -> tuple[Batch, ...]:
         if posture.load is None or self.load.mesh is None:
             return ()
-        return (place(self.load.mesh(), posture.load, tint=self.load_tint, dust=self.outfit.dust),)
+        return (place(self.load.mesh(), posture.load, tint=self.load_tint, dust=self.outfit.dust, entity_id=CARRIED),)
 
 
 def _build(girth: float) -> str:

@@ -136,7 +136,7 @@ def _gallery(columns: int) -> Mesh:
         )
         for k in range(treads)
     ]
-    slope = [((x, half_y, floor_m + z), (x, foot_y, z)) for x in (deck_x - 0.48, deck_x + 0.48) for z in (-0.05, 0.95)]
+    slope = [((x, half_y, floor_m + z), (x, foot_y, z)) for x in (deck_x - 0.48, deck_x + 0.48) for z in (0.05, 0.95)]
     ends = [((x, foot_y, 0.0), (x, foot_y, 0.95)) for x in (deck_x - 0.48, deck_x + 0.48)]
     return join(
         [

@@ -17,7 +17,6 @@ from standoff.simulation.props.materials import (
     WOODS,
     bar,
     block,
-    laid,
     scattered,
     single,
     tints,
@@ -166,7 +165,7 @@ def _deck(rng: np.random.Generator) -> Mesh:
     bare = length - poured_length
     parts.append(_lattice((bare, width - 0.1), 0.3, 0.014, rng).at(poured_length / 2, 0.0, 0.12))
     for x in (-0.3, 0.3):
-        parts += [laid(join(starters(rng, (0.3, 0.3), height, 0.9, 0.15)), x * length, y * width, 0.0, 0.0)
+        parts += [join(starters(rng, (0.3, 0.3), height, 0.9, 0.15)).at(x * length, y * width, 0.0)
                   for y in (-0.25, 0.25)]  # fmt: skip
     return join(parts)
 
@@ -191,7 +190,7 @@ def _mat(rng: np.random.Generator) -> Mesh:
 def _mats(rng: np.random.Generator) -> tuple[Batch, ...]:
     """A stack of mats that slid, on two timbers."""
     count = int(rng.integers(1, 9))
-    poses = scattered(rng, rng.normal(0.0, 0.05, (count, 2)), 0.1 + 0.028 * np.arange(count), 1.0)
+    poses = scattered(rng, rng.normal(0.0, 0.05, (count, 2)), np.linspace(0.1, 0.1 + 0.028 * (count - 1), count), 1.0)
     turn = np.deg2rad(rng.normal(0.0, 1.5, count))
     poses[:, 0, 0] = poses[:, 1, 1] = np.cos(turn)
     poses[:, 1, 0], poses[:, 0, 1] = np.sin(turn), -np.sin(turn)
@@ -280,7 +279,7 @@ def _footing_rows(rng: np.random.Generator) -> tuple[Batch, ...]:
     """Rows of equal footings on the building's grid, as most foundation works show them."""
     rows, columns, pitch = int(rng.integers(1, 3)), int(rng.integers(2, 4)), rng.uniform(3.2, 4.2)
     x, y = np.meshgrid((np.arange(columns) - (columns - 1) / 2) * pitch, (np.arange(rows) - (rows - 1) / 2) * pitch)
-    poses = np.stack([translation(*xy, 0.0) for xy in np.stack([x.ravel(), y.ravel()], axis=-1)])
+    poses = np.stack([translation(east, north, 0.0) for east, north in zip(x.ravel(), y.ravel(), strict=True)])
     works = footing(int(rng.integers(8)))
     return (place(works, poses, tint=(1.0, 1.0, 1.0), dust=rng.uniform(0.1, 0.6, len(poses))),)
 

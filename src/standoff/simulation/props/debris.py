@@ -33,6 +33,7 @@ _HOSES = tuple(srgb(code) for code in ("#26262a", "#b5401f", "#c2a01f", "#2f5fa0
 _CARDBOARD = (srgb("#9a7b56"), srgb("#b0936a"), srgb("#7f684c"))
 _FILMS = (WHITE_PLASTIC, WHITE_PLASTIC, srgb("#b5babd"), srgb("#2a2b2e"), srgb("#5c7f9c"))
 _TARPAULINS = (srgb("#2f5f93"), srgb("#4b6a48"), srgb("#8d8f8d"), srgb("#3a3b3d"), srgb("#a9a08c"), srgb("#b96a2a"))
+_BAGS = (DARK_PLASTIC, DARK_PLASTIC, srgb("#3f5f9a"), WHITE_PLASTIC)
 _CORES = (srgb("#222224"), srgb("#b85c1e"), srgb("#8f2f24"), srgb("#5a5a5c"))
 
 
@@ -187,7 +188,9 @@ def _cable_drum(rng: np.random.Generator) -> Mesh:
 def _tyre(rng: np.random.Generator) -> Mesh:
     radius, width = rng.uniform(0.3, 0.75), rng.uniform(0.2, 0.4)
     one = tubular(radius, 0.55 * radius, width, srgb("#2c2b2a"), Surface.RUBBER)
-    return join([one.at(*rng.normal(0.0, 0.04, 2), (level + 0.5) * width) for level in range(int(rng.integers(1, 4)))])
+    return join(
+        [laid(one, rng.normal(0.0, 0.04, 2), (level + 0.5) * width, 0.0) for level in range(int(rng.integers(1, 4)))]
+    )
 
 
 def _tyres(rng: np.random.Generator) -> tuple[Batch, ...]:
@@ -248,7 +251,7 @@ def _site_rubbish(rng: np.random.Generator) -> Mesh:
         colour = (*WOODS, *FADED, *_CARDBOARD)[int(rng.integers(len(WOODS) + len(FADED) + len(_CARDBOARD)))]
         piece = block((size[0], size[1], size[2]), colour, Surface.PLASTIC)
         tilted = piece.moved(rotation("y", rng.normal(0.0, 6.0)))
-        parts.append(laid(tilted, *rng.normal(0.0, 0.5, 2).clip(-1.2, 1.2), 0.0, rng.uniform(0.0, 360.0)))
+        parts.append(laid(tilted, rng.normal(0.0, 0.5, 2).clip(-1.2, 1.2), 0.0, rng.uniform(0.0, 360.0)))
     return join(parts)
 
 
@@ -265,8 +268,6 @@ DEBRIS: tuple[Prop, ...] = (
     Prop("tyres", 2.0, _tyres, 0.6),
     single("scrap steel", 1.7, 1.0, _scrap_steel, free=True),
     Prop("walkway", 4.2, _walkway, 0.8),
-    single(
-        "rubbish bags", 1.5, 0.9, _bin_bags, (DARK_PLASTIC, DARK_PLASTIC, srgb("#3f5f9a"), WHITE_PLASTIC), free=True
-    ),
+    single("rubbish bags", 1.5, 0.9, _bin_bags, _BAGS, free=True),
     single("site rubbish", 1.6, 1.3, _site_rubbish, free=True),
 )

@@ -10,7 +10,7 @@ import shapely
 import trimesh
 
 from standoff.core.homography import FloatArray
-from standoff.simulation.mesh import Colour, Mesh, Surface, rotation, scaling, srgb
+from standoff.simulation.mesh import Colour, Mesh, Surface, join, rotation, scaling, srgb
 from standoff.simulation.props.materials import (
     FADED,
     SANDS,
@@ -47,7 +47,7 @@ def pebble(rng: np.random.Generator) -> Mesh:
 @varied
 def _soil_heap(rng: np.random.Generator) -> Mesh:
     radius = rng.uniform(1.2, 3.2)
-    return mound(rng, radius, radius * rng.uniform(0.3, 0.55), None, lumps=0.2)
+    return _cloddy(rng, mound(rng, radius, radius * rng.uniform(0.3, 0.55), None, lumps=0.2), 26)
 
 
 @varied
@@ -60,7 +60,17 @@ def _sand_heap(rng: np.random.Generator) -> Mesh:
 def _spread(rng: np.random.Generator) -> Mesh:
     """What is left of a heap: a thin, wide, lumpy patch."""
     radius = rng.uniform(1.0, 2.5)
-    return mound(rng, radius, rng.uniform(0.1, 0.3), None, lumps=0.5)
+    return _cloddy(rng, mound(rng, radius, rng.uniform(0.1, 0.3), None, lumps=0.5), 14)
+
+
+def _cloddy(rng: np.random.Generator, heap: Mesh, count: int) -> Mesh:
+    """Return a heap with clods on its flanks, lighter and darker than the rest."""
+    spots = heap.vertices_m[rng.permutation(np.flatnonzero(heap.vertices_m[:, 2] > 0.03))[:count]]
+    clods = []
+    for spot in spots:
+        clod = stone(rng, 7).moved(scaling(*rng.uniform(0.12, 0.4, 3)))
+        clods.append(toned(clod, rng.uniform(0.75, 1.0)).at(float(spot[0]), float(spot[1]), float(spot[2])))
+    return join([heap, *clods])
 
 
 @varied
@@ -115,7 +125,7 @@ def _heap(
         reach_m = 0.8 * float(np.abs(mesh.vertices_m[:, 0]).max())
         return (
             place(mesh, rotation("z", rng.uniform(0.0, 360.0)) @ grown, tint=tints(rng, palette, 1), dust=0.15),
-            _stones_around(rng, 24, 0.7 * reach_m, 1.25 * reach_m, 0.09),
+            _stones_around(rng, 30, 0.7 * reach_m, 1.3 * reach_m, 0.12),
         )
 
     return make
@@ -170,8 +180,8 @@ def scatter_litter(
         poses = scattered(rng, xy[chosen], z[chosen] + kind.lift * sizes, sizes)
         colours = tints(rng, kind.palette, len(chosen), 0.25)
         for variant in range(kind.variants):
-            batches.append(place(kind.build(variant), poses[variant :: kind.variants], tint=colours[variant :: kind.variants],
-                                 dust=0.35))  # fmt: skip
+            part = slice(variant, None, kind.variants)
+            batches.append(place(kind.build(variant), poses[part], tint=colours[part], dust=0.35))
     return tuple(batch for batch in batches if len(batch.poses))
 
 
@@ -188,8 +198,8 @@ class _Litter:
 
 
 _LITTER = (
-    _Litter(pebble, _STONE_VARIANTS, 0.64, 0.09, 0.12, STONES + SOILS),
-    _Litter(_scrap, 4, 0.14, 0.2, 0.0, _SCRAPS),
+    _Litter(pebble, _STONE_VARIANTS, 0.66, 0.11, 0.12, STONES + SOILS),
+    _Litter(_scrap, 4, 0.12, 0.2, 0.0, _SCRAPS),
     _Litter(_splinter, 3, 0.15, 0.55, 0.0, WOODS),
     _Litter(weed, 3, 0.07, 0.9, 0.0, _WEEDS),
 )

@@ -75,7 +75,7 @@ def block(size_m: tuple[float, float, float], colour: Colour | None, surface: Su
 
 
 def bar(
-    start_m: Sequence[float], stop_m: Sequence[float], radius_m: float, colour: Colour | None,
+    start_m: Sequence[float] | FloatArray, stop_m: Sequence[float] | FloatArray, radius_m: float, colour: Colour | None,
     surface: Surface = Surface.STEEL, *, sections: int = 6, capped: bool = True,
 ) -> Mesh:  # fmt: skip
     """Return a straight round bar between two points."""
@@ -116,7 +116,7 @@ def relief(points_m: FloatArray, colour: Colour | None, surface: Surface, mottli
     solid.update_faces(solid.nondegenerate_faces())
     solid.remove_unreferenced_vertices()
     mesh = Mesh.of(solid, colour, surface, crease_deg=75.0)
-    blotches = ripples(np.random.default_rng(rows * 1000 + columns), mesh.vertices_m[:, :2], 1.1, 4)
+    blotches = ripples(np.random.default_rng(rows * 1000 + columns), mesh.vertices_m[:, :2].astype(np.float64), 1.1, 4)
     return toned(mesh, np.clip(0.9 + mottling * blotches, 0.6, 1.0))
 
 
@@ -242,9 +242,9 @@ def piled(
     return join(copies)
 
 
-def laid(mesh: Mesh, x_m: float, y_m: float, z_m: float, turn_deg: float) -> Mesh:
+def laid(mesh: Mesh, xy_m: FloatArray | tuple[float, float], z_m: float, turn_deg: float) -> Mesh:
     """Return the mesh turned about z and moved."""
-    return mesh.moved(translation(x_m, y_m, z_m) @ rotation("z", turn_deg))
+    return mesh.moved(translation(xy_m[0], xy_m[1], z_m) @ rotation("z", turn_deg))
 
 
 def tubular(radius_m: float, hole_radius_m: float, length_m: float, colour: Colour | None, surface: Surface) -> Mesh:

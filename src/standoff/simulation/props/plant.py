@@ -27,8 +27,8 @@ PLANT: Mapping[str, Prop] = {
     for prop in (
         Prop("container", 6.4, make_container, 1.6),
         Prop("skip", 3.4, make_skip, 1.2),
-        Prop("cabin", 3.6, make_cabin, 1.2),
-        Prop("cabin_block", 7.0, make_cabin_block, 0.7),
+        Prop("cabin", 3.8, make_cabin, 1.2),
+        Prop("cabin_block", 7.9, make_cabin_block, 0.7),
         Prop("toilet", 2.2, make_toilet, 1.0),
         Prop("crane", 4.2, make_crane, 0.5),
         Prop("gate", 8.3, make_gate, 0.2),
@@ -48,7 +48,7 @@ PLANT: Mapping[str, Prop] = {
         Prop("scaffold", 7.8, make_scaffold, 0.8),
         Prop("parked_car", 3.0, make_parked_car, 1.4),
         Prop("parked_row", 8.6, make_parked_row, 0.6),
-        Prop("parked_truck", 4.8, make_parked_truck, 0.5),
+        Prop("parked_truck", 5.4, make_parked_truck, 0.5),
     )
 }
 """Every family by name; `crane` reaches over half the site, but only its foot keeps others away."""

@@ -35,12 +35,12 @@ def make_generator(rng: np.random.Generator) -> tuple[Batch, ...]:
     """Build a generator in its canopy, on skids, its cable running off."""
     size = rng.uniform(0.8, 1.5)
     pose = np.diag([size, rng.uniform(0.9, 1.15), rng.uniform(0.9, 1.1), 1.0])
-    return (_painted(rng, _generator(), pose), place(_cable(int(rng.integers(4))), np.eye(4), dust=0.5))
+    return (_painted(rng, _generator(), pose), place(_cable(int(rng.integers(4))), np.eye(4), dust=0.15))
 
 
 def make_compressor(rng: np.random.Generator) -> tuple[Batch, ...]:
     """Build a compressor on a single-axle trailer with a hose."""
-    hose = place(_cable(int(rng.integers(4))), rotation("z", 180.0), dust=0.5)
+    hose = place(_cable(int(rng.integers(4))), rotation("z", 180.0), dust=0.15)
     return (_painted(rng, _compressor(), np.eye(4)), hose)
 
 
@@ -63,7 +63,7 @@ def make_small_mixer(rng: np.random.Generator) -> tuple[Batch, ...]:
 
 def make_pump(rng: np.random.Generator) -> tuple[Batch, ...]:
     """Build a portable pump with suction and delivery hose."""
-    hoses = [place(_cable(int(rng.integers(4))), rotation("z", turn), dust=0.6) for turn in (0.0, 180.0)]
+    hoses = [place(_cable(int(rng.integers(4))), rotation("z", turn), dust=0.15) for turn in (0.0, 180.0)]
     return (_painted(rng, _pump(), np.eye(4)), *hoses)
 
 

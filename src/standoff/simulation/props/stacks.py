@@ -49,7 +49,7 @@ def _timber(rng: np.random.Generator) -> Mesh:
     stack = piled(rng, beam.at(0.0, 0.0, 0.1), layers, across, pitch, 0.07)
     bearers = [block((0.09, across * pitch[0], 0.1 + layers * pitch[1] * 0.97), None, Surface.WOOD).at(x * length, 0, 0)
                for x in (-0.32, 0.32)]  # fmt: skip
-    loose = laid(beam, rng.normal(0.0, 0.2), 0.6 * across * pitch[0] + 0.2, 0.0, rng.normal(0.0, 12.0))
+    loose = laid(beam, (rng.normal(0.0, 0.2), 0.6 * across * pitch[0] + 0.2), 0.0, rng.normal(0.0, 12.0))
     return join([stack, *(toned(bearer, 0.7) for bearer in bearers), loose])
 
 
@@ -60,8 +60,8 @@ def _sheets(rng: np.random.Generator) -> Mesh:
     for _ in range(int(rng.integers(4, 14))):
         thickness = rng.uniform(0.02, 0.06)
         sheet = toned(block((2.5, 1.25, thickness), None, Surface.WOOD), rng.uniform(0.65, 1.0))
-        dx, dy = rng.normal(0.0, 0.05, 2)
-        parts.append(laid(sheet, dx, dy, z, rng.normal(0.0, 1.8)))
+        offset = rng.normal(0.0, 0.05, 2)
+        parts.append(laid(sheet, offset, z, rng.normal(0.0, 1.8)))
         z += thickness + 0.008
     return join(parts)
 
@@ -75,8 +75,8 @@ def _formwork_stack(rng: np.random.Generator) -> Mesh:
     for _ in range(int(rng.integers(3, 9))):
         rim = toned(block((length, width, 0.1), frame, Surface.PAINT), rng.uniform(0.7, 1.1))
         face = toned(block((length - 0.1, width - 0.1, 0.004), FILM_FACED_PLY, Surface.WOOD), rng.uniform(0.7, 1.5))
-        dx, dy = rng.normal(0.0, 0.04, 2)
-        parts.append(laid(join([rim, face.at(0.0, 0.0, 0.1)]), dx, dy, z, rng.normal(0.0, 1.0)))
+        offset = rng.normal(0.0, 0.04, 2)
+        parts.append(laid(join([rim, face.at(0.0, 0.0, 0.1)]), offset, z, rng.normal(0.0, 1.0)))
         z += 0.108
     return join(parts)
 
@@ -93,7 +93,7 @@ def pallet(rng: np.random.Generator) -> Mesh:
 def _pallets(rng: np.random.Generator) -> tuple[Batch, ...]:
     count = int(rng.integers(1, 11))
     poses = np.stack([
-        translation(*rng.normal(0.0, 0.03, 2), 0.125 * level) @ rotation("z", rng.normal(0.0, 3.0))
+        translation(rng.normal(0.0, 0.03), rng.normal(0.0, 0.03), 0.125 * level) @ rotation("z", rng.normal(0.0, 3.0))
         for level in range(count)
     ])  # fmt: skip
     if rng.uniform() < 0.4:
@@ -189,7 +189,7 @@ def _sacks(rng: np.random.Generator) -> Mesh:
         for number in range(5 if layer < layers - 1 else int(rng.integers(1, 6))):
             x, y = ((-0.3, -0.2), (0.3, -0.2), (-0.38, 0.2), (0.0, 0.2), (0.38, 0.2))[number]
             turn = 0.0 if number < 2 else 90.0
-            parts.append(toned(laid(sack, x, y, 0.12 * layer, turn + rng.normal(0, 4)), rng.uniform(0.75, 1.0)))
+            parts.append(toned(laid(sack, (x, y), 0.12 * layer, turn + rng.normal(0, 4)), rng.uniform(0.75, 1.0)))
     return join(parts)
 
 
@@ -260,7 +260,7 @@ def _scaffold_tubes(rng: np.random.Generator) -> Mesh:
     for _ in range(int(rng.integers(14, 30))):
         y = rng.normal(0.0, 0.22)
         lift = 0.15 + max(0.0, 0.35 - abs(y)) * rng.uniform(0.0, 1.0)
-        parts.append(laid(toned(tube, rng.uniform(0.6, 1.1)), rng.normal(0.0, 0.15), y, lift, rng.normal(0.0, 1.0)))
+        parts.append(laid(toned(tube, rng.uniform(0.6, 1.1)), (rng.normal(0.0, 0.15), y), lift, rng.normal(0.0, 1.0)))
     return join(parts)
 
 
@@ -271,7 +271,7 @@ def _scaffold_frames(rng: np.random.Generator) -> Mesh:
         *(block((0.05, 0.7, 0.05), GALVANISED, Surface.STEEL).at(x, 0.0, 0.0) for x in (-0.95, -0.2, 0.55, 0.95)),
     ])  # fmt: skip
     count = int(rng.integers(3, 9))
-    return join([laid(toned(frame, rng.uniform(0.7, 1.1)), *rng.normal(0.0, 0.04, 2), 0.08 + 0.06 * level,
+    return join([laid(toned(frame, rng.uniform(0.7, 1.1)), rng.normal(0.0, 0.04, 2), 0.08 + 0.06 * level,
                       rng.normal(0.0, 2.0)) for level in range(count)])  # fmt: skip
 
 
@@ -282,7 +282,7 @@ def _geotextile(rng: np.random.Generator) -> Mesh:
     roll = cylinder(radius, length, colour, Surface.FABRIC, axis="x", sections=12).at(0.0, 0.0, radius)
     core = cylinder(0.05, length + 0.02, HOLE, Surface.FABRIC, axis="x", sections=6).at(0.0, 0.0, radius)
     one = join([roll, core])
-    parts = [laid(toned(one, rng.uniform(0.8, 1.0)), 0.0, (n - 0.5) * 2.1 * radius, 0.0, rng.normal(0.0, 2.0))
+    parts = [laid(toned(one, rng.uniform(0.8, 1.0)), (0.0, (n - 0.5) * 2.1 * radius), 0.0, rng.normal(0.0, 2.0))
              for n in range(int(rng.integers(1, 4)))]  # fmt: skip
     return join(parts)
 

@@ -22,7 +22,14 @@ def make_tank(rng: np.random.Generator) -> tuple[Batch, ...]:
     if kind == 2:
         count = int(rng.integers(1, 5))
         poses = np.stack([translation((k % 2) * 1.25 - 0.6, (k // 2) * 1.1 - 0.5, 0.0) for k in range(count)])
-        return (place(_crate_tank(), poses, tint=np.array(srgb("#cfd2d0")) * rng.uniform(0.75, 1.0), dust=0.3),)
+        return (
+            place(
+                _crate_tank(),
+                poses,
+                tint=np.array(srgb("#cfd2d0")) * rng.uniform(0.75, 1.0),
+                dust=rng.uniform(0.1, 0.5),
+            ),
+        )
     if kind == 1:
         tint = np.array(_PLASTICS[int(rng.integers(len(_PLASTICS)))])
         stretch = scaling(1.0, 1.0, rng.uniform(0.8, 1.2))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from standoff.simulation.mesh import Mesh, Surface, ball, cylinder, join, lathe, profile, rotation, srgb, translation
@@ -94,8 +96,9 @@ def _mixer(rng: np.random.Generator) -> Mesh:
     tilt = translation(0.0, 0.0, 0.95) @ rotation("y", rng.uniform(25.0, 75.0)) @ rotation("z", rng.uniform(0.0, 360.0))
     parts = [join([drum, mouth]).moved(tilt), block((0.3, 0.32, 0.35), colour, Surface.PAINT).at(-0.45, 0.0, 0.6)]
     for side in (-0.33, 0.33):
-        parts += [bar((-0.35, side, 0.25), (0.0, side, 0.95), 0.03, RUSTY_STEEL), bar((0.45, side, 0.0), (0.0, side, 0.95), 0.03, RUSTY_STEEL),
-                  cylinder(0.24, 0.07, DARK_PLASTIC, Surface.RUBBER, axis="y", sections=12).at(-0.35, side, 0.24)]  # fmt: skip
+        wheel = cylinder(0.24, 0.07, DARK_PLASTIC, Surface.RUBBER, axis="y", sections=12)
+        parts.append(wheel.at(-0.35, side, 0.24))
+        parts += [bar(foot, (0.0, side, 0.95), 0.03, RUSTY_STEEL) for foot in ((-0.35, side, 0.25), (0.45, side, 0.0))]
     return join(parts)
 
 
@@ -104,8 +107,8 @@ def _post(rng: np.random.Generator) -> Mesh:
     """Something slim that stands: a sign, a striped marker, a standpipe, a post with tape, a pipe with a cap."""
     kind, height = int(rng.integers(4)), rng.uniform(1.3, 2.0)
     if kind == 0:
-        face = cylinder(0.3, 0.02, (srgb("#2f5fa0"), WHITE_PLASTIC, FORMWORK_YELLOW)[int(rng.integers(3))], Surface.PAINT,
-                        axis="y", sections=14)  # fmt: skip
+        colour = (srgb("#2f5fa0"), WHITE_PLASTIC, FORMWORK_YELLOW)[int(rng.integers(3))]
+        face = cylinder(0.3, 0.02, colour, Surface.PAINT, axis="y", sections=14)
         return join([bar((0, 0, 0), (0, 0, height + 0.3), 0.03, GALVANISED), face.at(0.0, -0.04, height),
                      block((0.5, 0.5, 0.1), DARK_PLASTIC, Surface.RUBBER)])  # fmt: skip
     if kind == 1:
@@ -164,7 +167,7 @@ def _stakes(rng: np.random.Generator) -> Mesh:
         parts.append(block((0.05, 0.05, height), WOODS[int(rng.integers(6))], Surface.WOOD).at(x, y, 0.0))
         parts.append(block((0.06, 0.06, 0.12), tape, Surface.PAINT).at(x, y, height - 0.1))
         tops.append((x, y, height * 0.85))
-    for start, stop in zip(tops[:-1], tops[1:], strict=True):
+    for start, stop in pairwise(tops):
         middle = (0.5 * (start[0] + stop[0]), 0.5 * (start[1] + stop[1]), 0.9 * start[2])
         for piece in ((start, middle), (middle, stop)):
             parts.append(bar(*piece, 0.02, tape, Surface.PLASTIC, sections=3, capped=False))
@@ -181,7 +184,7 @@ def _trestle(rng: np.random.Generator) -> Mesh:
     for _ in range(int(rng.integers(2, 6))):
         size = rng.uniform((0.1, 0.1, 0.05), (0.45, 0.3, 0.3))
         thing = block((size[0], size[1], size[2]), FADED[int(rng.integers(len(FADED)))], Surface.PAINT)
-        parts.append(laid(thing, rng.uniform(-0.7, 0.7), rng.uniform(-0.2, 0.2), 0.84, rng.uniform(0.0, 90.0)))
+        parts.append(laid(thing, rng.uniform((-0.7, -0.2), (0.7, 0.2)), 0.84, rng.uniform(0.0, 90.0)))
     if rng.uniform() < 0.4:
         cloth = ball((0.28, 0.22, 0.06), _VESTS[int(rng.integers(2))], Surface.FABRIC, detail=1)
         parts.append(cloth.at(0.5, 0.1, 0.88))
@@ -194,9 +197,9 @@ def _tool_boxes(rng: np.random.Generator) -> Mesh:
     for number in range(int(rng.integers(1, 4))):
         colour = FADED[int(rng.integers(len(FADED)))]
         size = (float(rng.uniform(0.5, 1.3)), float(rng.uniform(0.35, 0.6)), float(rng.uniform(0.25, 0.7)))
-        chest = join([block(size, colour, Surface.PAINT),
-                      toned(block((size[0] * 1.02, size[1] * 1.02, 0.06), colour, Surface.PAINT), 0.8).at(0, 0, size[2])])  # fmt: skip
-        parts.append(laid(chest, rng.normal(0.0, 0.1), 0.75 * number - 0.5, 0.0, rng.normal(0.0, 10.0)))
+        lid = toned(block((size[0] * 1.02, size[1] * 1.02, 0.06), colour, Surface.PAINT), 0.8)
+        chest = join([block(size, colour, Surface.PAINT), lid.at(0.0, 0.0, size[2])])
+        parts.append(laid(chest, (rng.normal(0.0, 0.1), 0.75 * number - 0.5), 0.0, rng.normal(0.0, 10.0)))
     return join(parts)
 
 

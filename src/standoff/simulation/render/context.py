@@ -10,7 +10,8 @@ import numpy as np
 
 from standoff.core.errors import MissingDependency
 
-_GLSL = "#version 430\n"
+_OPENGL = 430
+_GLSL = f"#version {_OPENGL}\n"
 
 
 def open_context() -> Any:  # noqa: ANN401 - moderngl has no types
@@ -27,11 +28,12 @@ def open_context() -> Any:  # noqa: ANN401 - moderngl has no types
             found="none",
             fix="run: pip install 'standoff[sim]'",
         ) from None
+    settings: dict[str, Any] = {"backend": "egl", "require": _OPENGL}
     try:
-        return moderngl.create_standalone_context(backend="egl", require=430)
-    except (ImportError, OSError, RuntimeError, ValueError, moderngl.Error) as error:
+        return moderngl.create_context(standalone=True, **settings)
+    except Exception as error:  # noqa: BLE001 - a missing library or driver is a plain Exception in glcontext
         raise MissingDependency(
-            expected="OpenGL 4.3 on EGL, which Mesa offers with or without a graphics card",
+            expected="OpenGL 4.3 through EGL for the simulator's pictures, with or without a graphics card",
             found=f"none that works ({error})",
             fix="on Debian or Ubuntu run: apt-get install libegl1 libgl1-mesa-dri",
         ) from None

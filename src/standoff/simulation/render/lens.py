@@ -31,12 +31,18 @@ class LensMap:
     @classmethod
     def of(cls, camera: Camera, left_px: int, top_px: int, width_px: int, height_px: int) -> LensMap:
         """Undistort the pixel centres of a rectangle of the picture, which may lie partly outside of it."""
-        x, y = left_px + np.arange(width_px), top_px + np.arange(height_px)
+        x, y = left_px + np.arange(width_px, dtype=np.float64), top_px + np.arange(height_px, dtype=np.float64)
         undistorted = _undistorted_grid(camera, x, y)
-        low = np.floor(np.nanmin(undistorted, axis=(0, 1), initial=np.inf)) - _MARGIN_PX
-        high = np.ceil(np.nanmax(undistorted, axis=(0, 1), initial=-np.inf)) + _MARGIN_PX
-        if not np.isfinite([low, high]).all():
-            low, high = np.zeros(2), np.ones(2)
+        border = (undistorted[0], undistorted[-1], undistorted[:, 0], undistorted[:, -1])
+        shown = np.concatenate(border)
+        if np.isnan(shown).any():
+            # The lens shows less than the rectangle: its outermost points are somewhere inside.
+            shown = undistorted.reshape(-1, 2)
+            shown = shown[~np.isnan(shown[:, 0])]
+        if not len(shown):
+            shown = np.zeros((1, 2))
+        low = np.floor(shown.min(axis=0)) - _MARGIN_PX
+        high = np.ceil(shown.max(axis=0)) + _MARGIN_PX
         size = (high - low + 1).astype(int).tolist()
         return cls(undistorted, (int(low[0]), int(low[1])), (size[0], size[1]))
 
@@ -56,5 +62,7 @@ def _undistorted_grid(camera: Camera, x: FloatArray, y: FloatArray) -> FloatArra
     if np.isnan(coarse).any():
         return _exact_grid(camera, x, y)
     across, down = (make_interp_spline(knot, np.eye(len(knot)))(axis) for knot, axis in zip(knots, (x, y), strict=True))
-    fine: FloatArray = np.stack([down @ coarse[..., i] @ across.T for i in range(2)], axis=-1)
+    fine = np.empty((len(y), len(x), 2))
+    for i in range(2):
+        np.matmul(down, coarse[..., i] @ across.T, out=fine[..., i])
     return fine

@@ -14,8 +14,8 @@ def _fractal(rng: np.random.Generator, size: int, exponent: float, lowest_cycles
     frequency = np.hypot(*np.meshgrid(np.fft.rfftfreq(size) * size, np.fft.fftfreq(size) * size))
     amplitude = np.where(frequency >= lowest_cycles, np.maximum(frequency, 1.0) ** -exponent, 0.0)
     field: npt.NDArray[np.float64] = np.fft.irfft2(np.fft.rfft2(rng.standard_normal((size, size))) * amplitude)
-    field -= field.mean()
-    return field / field.std()
+    unit: npt.NDArray[np.float64] = (field - field.mean()) / field.std()
+    return unit
 
 
 def _pebbles(rng: np.random.Generator, size: int) -> npt.NDArray[np.float64]:

@@ -101,7 +101,7 @@ class Relief:
         cell_points = vertices.reshape(-1, 6)[corners[:, [0, 2, 1, 5]], :3]
         low = np.minimum.reduceat(cell_points.min(axis=1), starts)
         high = np.maximum.reduceat(cell_points.max(axis=1), starts)
-        self._centre_m = (low + high) / 2
+        self._centre_m = ((low + high) / 2).astype(np.float32)
         self._radius_m = np.linalg.norm(high - low, axis=1).astype(np.float32) / 2
         self.lowest_m, self.highest_m = float(ground.height_m.min()), float(ground.height_m.max())
         self.vertices = context.buffer(vertices.tobytes())

@@ -54,6 +54,10 @@ class Renderer:
     def __init__(self, size_px: tuple[int, int], samples: int = 4) -> None:
         self._samples = samples
         self._context = open_context()
+        with self._context:
+            self._prepare(size_px)
+
+    def _prepare(self, size_px: tuple[int, int]) -> None:
         # Row 0 of every picture is at its top, which turns counter-clockwise triangles round.
         self._context.front_face = "cw"
         self._arena = Arena(self._context)
@@ -80,11 +84,12 @@ class Renderer:
 
     def load(self, ground: Ground, props: Sequence[Batch]) -> None:
         """Upload a scene in place of the last one; meshes that were uploaded before are not sent again."""
-        if self._relief is not None:
-            self._relief.release()
-        self._arena.forget_if_large()
-        self._relief = Relief(self._context, ground)
-        self._static = Instances.of(props, self._arena)
+        with self._context:
+            if self._relief is not None:
+                self._relief.release()
+            self._arena.forget_if_large()
+            self._relief = Relief(self._context, ground)
+            self._static = Instances.of(props, self._arena)
 
     def render(self, view: View, batches: Sequence[Batch], light: Light, look: Look) -> Rendered:
         """Draw the loaded scene.
@@ -97,19 +102,8 @@ class Renderer:
         """
         if self._relief is None:
             raise RuntimeError("load a scene before rendering")
-        lens_map = self._development.lens_map(view.camera)
-        frustum = Frustum(view, lens_map.origin_px, lens_map.size_px)
-        targets = self._targets_of(lens_map.size_px)
-        everything = self._static + Instances.of(batches, self._arena)
-        box = self._shadow.draw(light, frustum, everything, self._arena, self._relief)
-        visible = frustum.visible(everything)
-        targets.id_pass.use()
-        targets.id_pass.clear(depth=1.0)
-        self._ids.draw(frustum, visible, self._arena, self._relief)
-        self._openness.draw(targets, frustum)
-        sun = sun_uniforms(light, box, self._shadow, frustum)
-        self._colour.draw(targets, frustum, visible, self._arena, self._relief, self._shadow, sun)
-        return Rendered(*self._development.develop(targets, frustum, look))
+        with self._context:
+            return self._draw(view, batches, light, look, self._relief)
 
     def silhouette_px(self, view: View, batches: Sequence[Batch]) -> int:
         """Count the pixels that the batches alone would cover, nothing in front of them.
@@ -117,7 +111,23 @@ class Renderer:
         Pixels outside the picture count too, up to one picture's size away from it; what is behind the camera or
         outside what the lens model describes does not.
         """
-        return self._ids.count_silhouette(view, batches, self._arena)
+        with self._context:
+            return self._ids.count_silhouette(view, batches, self._arena)
+
+    def _draw(self, view: View, batches: Sequence[Batch], light: Light, look: Look, relief: Relief) -> Rendered:
+        lens_map = self._development.lens_map(view.camera)
+        frustum = Frustum(view, lens_map.origin_px, lens_map.size_px)
+        targets = self._targets_of(lens_map.size_px)
+        everything = self._static + Instances.of(batches, self._arena)
+        box = self._shadow.draw(light, frustum, everything, self._arena, relief)
+        visible = frustum.visible(everything)
+        targets.id_pass.use()
+        targets.id_pass.clear(depth=1.0)
+        self._ids.draw(frustum, visible, self._arena, relief)
+        self._openness.draw(targets, frustum)
+        sun = sun_uniforms(light, box, self._shadow, frustum)
+        self._colour.draw(targets, frustum, visible, self._arena, relief, self._shadow, sun)
+        return Rendered(*self._development.develop(targets, frustum, look))
 
     def _targets_of(self, size_px: tuple[int, int]) -> Targets:
         if self._targets is None or self._targets.size_px != size_px:

@@ -60,7 +60,8 @@ class VideoFile:
             _mark_bt709(self._stream.codec_context)
         if bit_rate_bps is not None:
             self._stream.bit_rate = bit_rate_bps
-            self._stream.options = {"preset": preset} if encoder == "libx264" else {}
+            peak = {"maxrate": str(bit_rate_bps * 3 // 2), "bufsize": str(bit_rate_bps)}
+            self._stream.options = {"preset": preset, **peak} if encoder == "libx264" else peak
         elif encoder == "libx264":
             self._stream.options = {"crf": str(crf), "preset": preset}
         else:
@@ -106,6 +107,11 @@ class VideoFile:
             partial.replace(self._path)
         finally:
             partial.unlink(missing_ok=True)
+
+    def discard(self) -> None:
+        """Stop and remove the file."""
+        self._container.close()
+        self._path.unlink(missing_ok=True)
 
 
 def _mark_bt709(codec: VideoCodecContext) -> None:

@@ -28,7 +28,7 @@ void main() {
     normal = normalize(mix(normal, vec3(0.0, 0.0, 1.0), puddle));
     float roughness = mix(mix(0.95, 0.45, smoothstep(0.2, 0.8, wet)), 0.07, puddle);
     float open = texture(openness, gl_FragCoord.xy * openness_scale).r;
-    float lit = dot(normal, to_sun) > 0.0 ? sunlit(v_offset, normalize(v_normal)) : 0.0;
+    float lit = dot(normal, to_sun) > 0.0 ? sunlit(v_offset, normalize(v_normal), true) : 0.0;
     vec3 light = shade(clamp(albedo, 0.0, 0.9), normal, to_eye, roughness, 0.0, lit, open);
     radiance = vec4(min(hazy(light, away), vec3(30.0)), 1.0);
 }

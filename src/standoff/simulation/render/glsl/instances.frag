@@ -28,7 +28,7 @@ void main() {
     float roughness = mix(gloss.x + 0.15 * (stain.r - 0.5), 0.95, dust);
     normal = normalize(normal + gloss.z * (1.0 - dust) * vec3(grain.ba - 0.5, 0.0));
     float open = texture(openness, gl_FragCoord.xy * openness_scale).r;
-    float lit = dot(normal, to_sun) > 0.0 ? sunlit(v_offset, normal) : 0.0;
+    float lit = dot(normal, to_sun) > 0.0 ? sunlit(v_offset, normal, false) : 0.0;
     vec3 light = shade(albedo, normal, to_eye, clamp(roughness, 0.06, 1.0), gloss.y * (1.0 - dust), lit, open);
     radiance = vec4(min(hazy(light, away), vec3(30.0)), 1.0);
 }

@@ -1,0 +1,211 @@
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from evaluation.paper import drawn_clip
+
+from standoff.config import Settings, build_stage
+from standoff.config.settings import StageName
+from standoff.core.errors import DataError
+from standoff.core.types import Detections, Frame
+from standoff.evaluation.paper import BoxError, Clip, Trial, evaluate_clip, load_clip
+from standoff.evaluation.paper.localisation import true_scale_m_per_px
+from standoff.evaluation.paper.truth_detector import REFERENCE_MARGIN_PX, TrueBoxes
+from standoff.evaluation.paper.turning import Turning
+from standoff.evaluation.paper.watch import NOT_DETECTED, NOT_VISIBLE, open_clip_video
+from standoff.stages.frames import frame_from_array
+from standoff.stages.ground import ReferenceShape
+
+PICTURE = np.zeros((4, 4, 3), np.uint8)
+
+
+@pytest.fixture
+def copy_of(clip_folder: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(clip_folder, tmp_path / "copy"))
+
+
+def test_a_clip_is_read_as_it_was_written(clip_folder: Path) -> None:
+    clip = load_clip(clip_folder)
+    assert clip.frame_count == drawn_clip.FRAMES
+    assert clip.names() == ["worker", "wheel_loader", "excavator"]
+    assert clip.pairs.tolist() == [[0, 1], [0, 2]]
+    worker, loader, excavator = drawn_clip.ENTITIES
+    for frame in (0, 17):
+        expected = [drawn_clip.true_distance_m(frame, worker, other) for other in (loader, excavator)]
+        assert clip.distance_m[frame].tolist() == pytest.approx(expected)
+        np.testing.assert_allclose(clip.xy_m[frame, 1], loader.xy_m(drawn_clip.time_s(frame)))
+    assert np.flatnonzero(np.isnan(clip.box_px[:, 2, 0])).tolist() == list(drawn_clip.UNSEEN)
+
+
+def _without(name: str) -> Callable[[Path], None]:
+    return lambda folder: (folder / name).unlink()
+
+
+def _scene(**changes: object) -> Callable[[Path], None]:
+    def change(folder: Path) -> None:
+        path = folder / "scene.json"
+        path.write_text(json.dumps(json.loads(path.read_text()) | changes))
+
+    return change
+
+
+def _no_camera_column(folder: Path) -> None:
+    table = pq.read_table(folder / "frames.parquet")
+    pq.write_table(table.drop_columns(["reference_covered"]), folder / "frames.parquet")
+
+
+def _broken_table(folder: Path) -> None:
+    (folder / "truth.parquet").write_bytes(b"PAR1")
+
+
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [
+        (_without("scene.json"), "no .*scene.json"),
+        (_without("video.mp4"), "no .*video.mp4"),
+        (_without("truth.parquet"), "no .*truth.parquet"),
+        (_without("camera.yaml"), "no .*camera.yaml"),
+        (_scene(format=2), "format 2"),
+        (_scene(reference=None), "neither"),
+        (_scene(board={"corners_m": [[0.0, 0.0, 0.0]] * 12, "square_m": 1.0}), "12 in"),
+        (_no_camera_column, "without reference_covered"),
+        (_broken_table, "whole Parquet table"),
+    ],
+)
+def test_a_folder_that_is_no_clip_is_refused_in_one_line(
+    copy_of: Path, spoil: Callable[[Path], None], said: str
+) -> None:
+    spoil(copy_of)
+    with pytest.raises(DataError, match=said) as refused:
+        load_clip(copy_of)
+    assert "\n" not in str(refused.value)
+
+
+def test_truth_of_another_length_than_the_video_is_refused(copy_of: Path) -> None:
+    drawn_clip.write_tables(copy_of, frames=drawn_clip.FRAMES - 2)
+    with pytest.raises(DataError, match=f"{drawn_clip.FRAMES - 2} frames .* found {drawn_clip.FRAMES}"):
+        open_clip_video(load_clip(copy_of))
+
+
+def test_true_boxes_are_the_truths_own(clip_folder: Path) -> None:
+    clip = load_clip(clip_folder)
+    boxes = TrueBoxes(clip)
+    unseen = drawn_clip.UNSEEN[0]
+    for index, seen in ((3, [1, 2, 3]), (unseen, [1, 2])):
+        detections = boxes.detect(frame_from_array(PICTURE, index=index))
+        tracks = boxes.update(0.1 * index, detections)
+        assert tracks.track_id.tolist() == seen
+        rows = np.searchsorted(clip.entity_id, seen)
+        assert (tracks.xyxy_px == clip.box_px[index, rows]).all()
+        assert (tracks.class_id == clip.class_id[rows]).all()
+        wide = np.array([-1.0, -1.0, 1.0, 1.0]) * REFERENCE_MARGIN_PX
+        np.testing.assert_allclose(detections.xyxy_px[-1], clip.reference_box_px[index] + wide)
+
+
+def test_box_errors_have_the_stated_size_and_depend_on_the_seed_and_the_frame_alone(clip_folder: Path) -> None:
+    clip = load_clip(clip_folder)
+    noisy = [TrueBoxes(clip, BoxError(share=0.06), seed) for seed in (1, 1, 2)]
+    frames = [frame_from_array(PICTURE, index=index) for index in range(10)]
+    exact = np.stack([TrueBoxes(clip).detect(frame).xyxy_px[-1] for frame in frames])
+    one, again, other = (np.stack([boxes.detect(frame).xyxy_px[-1] for frame in frames]) for boxes in noisy)
+    backwards = np.stack([noisy[0].detect(frame).xyxy_px[-1] for frame in frames[::-1]])[::-1]
+    assert (one == again).all() and (one == backwards).all() and (one != other).any()
+    sides = np.tile(exact[:, 2:] - exact[:, :2], 2)
+    # 40 draws: the standard error of their spread is 11 %.
+    assert 0.06 * 0.6 < np.std((one - exact) / sides) < 0.06 * 1.4
+
+
+@pytest.mark.parametrize("turn", range(4))
+def test_a_square_that_was_taken_for_turned_is_turned_back(turn: int) -> None:
+    square_m = np.array([[4.0, 1.0], [6.0, 2.0], [5.0, 4.0], [3.0, 3.0]])
+    turning = Turning(ReferenceShape.from_corners(square_m), square_m)
+    true_px = np.array([[10.0, 90.0], [80.0, 95.0], [70.0, 20.0], [15.0, 30.0]])
+    error_px, found = turning.compare(np.roll(true_px, -turn, axis=0), true_px)
+    assert error_px.tolist() == [0.0] * 4
+    # Corner k was believed to be where the truth has corner k + turn.
+    np.testing.assert_allclose(turning.to_site(square_m, found), np.roll(square_m, -turn, axis=0), atol=1e-12)
+
+
+def test_an_uneven_shape_is_never_turned() -> None:
+    uneven_m = np.array([[0.0, 0.0], [2.4, 0.0], [2.6, 2.6], [-0.3, 2.0]])
+    turning = Turning(ReferenceShape.from_corners(uneven_m), uneven_m[[2, 3, 0, 1]])
+    true_px = 10.0 * uneven_m[[2, 3, 0, 1]]
+    error_px, turn = turning.compare(10.0 * uneven_m, true_px)
+    assert error_px.max() == 0.0 and turn == 0
+    assert turning.compare(10.0 * np.roll(uneven_m, -1, axis=0), true_px)[0].max() > 5.0
+
+
+def test_a_clip_with_a_board_alone_gets_the_lab_test_alone(board_folder: Path) -> None:
+    result = evaluate_clip(load_clip(board_folder), Trial())
+    assert result.board is not None
+    assert result.rectification is None and result.groups == ()
+
+
+@pytest.mark.parametrize(
+    ("preset", "figures"),
+    [
+        ("stationary-15", {"stationary-15 made worker-excavator", "stationary-15 mape worker-excavator"}),
+        ("virtual", {"virtual failed"}),
+        ("busy", set()),
+    ],
+)
+def test_a_preset_gets_the_papers_figures_that_are_its_own(copy_of: Path, preset: str, figures: set[str]) -> None:
+    _scene(preset=preset)(copy_of)
+    result = evaluate_clip(load_clip(copy_of), Trial(method="oriented"))
+    assert {figure.name for figure in result.figures()} == figures
+    assert {group.class_pair for group in result.groups} == {"worker-wheel_loader", "worker-excavator"}
+    assert all("benchmark itself" not in group.scores for group in result.groups)
+
+
+class ShiftedBoxes:
+    """Sees as a model does: without names, two pixels to the right, and never the loader."""
+
+    def __init__(self, clip: Clip, sees: str) -> None:
+        self._truth = TrueBoxes(clip)
+        self.description = {"class_map": {"a": "worker", "b": sees}}
+
+    def detect(self, frame: Frame) -> Detections:
+        seen = self._truth.detect(frame)
+        seen = seen[seen.class_id != 2]
+        return Detections(seen.xyxy_px + np.array([2.0, 0.0, 2.0, 0.0]), seen.score * 0.9, seen.class_id)
+
+
+def _with_model(monkeypatch: pytest.MonkeyPatch, clip: Clip, sees: str) -> Trial:
+    def build(name: StageName, settings: Settings) -> object:
+        return ShiftedBoxes(clip, sees) if name == "detect" else build_stage(name, settings)
+
+    monkeypatch.setattr("standoff.evaluation.paper.trial.build_stage", build)
+    return Trial(method="oriented", detector=Path("model.onnx"))
+
+
+def test_a_models_boxes_are_matched_with_the_truth_by_overlap(
+    clip_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clip = large_boxes(load_clip(clip_folder))
+    result = evaluate_clip(clip, _with_model(monkeypatch, clip, "reference"))
+    scores = {score.class_name: score for score in result.localisation}
+    assert scores["worker"].detected == scores["worker"].visible == drawn_clip.FRAMES
+    assert scores["wheel_loader"].detected == scores["wheel_loader"].located == 0
+    assert clip.reference is not None
+    assert scores["worker"].ale_m == pytest.approx(2.0 * true_scale_m_per_px(clip.reference).mean())
+    missing = {group.class_pair: group.missing_by_reason for group in result.groups}
+    assert missing["worker-wheel_loader"][NOT_DETECTED] >= drawn_clip.FRAMES - len(drawn_clip.HIDDEN)
+    assert set(missing["worker-excavator"]) >= {NOT_VISIBLE}
+
+
+def large_boxes(clip: Clip) -> Clip:
+    """Grow the boxes, so that two pixels are little of them."""
+    return replace(clip, box_px=clip.box_px + 15.0 * np.array([-1.0, -1.0, 1.0, 1.0]))
+
+
+def test_a_model_that_cannot_see_the_reference_is_refused(clip_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    clip = load_clip(clip_folder)
+    with pytest.raises(DataError, match="class `reference`"):
+        evaluate_clip(clip, _with_model(monkeypatch, clip, "excavator"))

@@ -1,0 +1,134 @@
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import tolerances
+from evaluation.paper import drawn_board, drawn_clip
+from typer.testing import CliRunner
+
+from standoff.cli.app import app
+from standoff.core.errors import ConfigError
+from standoff.evaluation.paper.published import PUBLISHED
+
+
+def evaluate(*words: object) -> str:
+    result = CliRunner().invoke(app, ["evaluate", "paper", *map(str, words)])
+    if result.exception is not None and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    assert result.exit_code == 0, result.output
+    return result.stdout
+
+
+def figures_of(clip: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    return {figure["name"]: figure for figure in clip["paper"]}
+
+
+@pytest.fixture(scope="module", params=["paper", "paper+tls", "oriented"])
+def measured(request: pytest.FixtureRequest, clip_folder: Path) -> dict[str, Any]:
+    (clip,) = json.loads(evaluate(clip_folder, "--method", request.param, "--json", "-"))["clips"]
+    return dict(clip)
+
+
+def test_flat_entities_under_true_boxes_are_where_they_are(measured: dict[str, Any]) -> None:
+    limit_m = tolerances.DRAWN_SITE_M[measured["trial"]["method"]]
+    assert {score["class_name"] for score in measured["localisation"]} == {"worker", "wheel_loader", "excavator"}
+    for score in measured["localisation"]:
+        assert score["ale_m"] == 0.0
+        assert score["position_mean_m"] < limit_m
+    for group in measured["pairs"]:
+        assert 0.0 < group["scores"]["after the filter"]["made_m"] < limit_m
+
+
+def test_failed_frames_are_counted_as_failed_whatever_fills_them(measured: dict[str, Any]) -> None:
+    hidden, frames = len(drawn_clip.HIDDEN), drawn_clip.FRAMES
+    rectification = measured["rectification"]
+    assert rectification["failed"] == rectification["failed_covered"] == hidden
+    assert sum(rectification["failed_by_reason"].values()) == hidden
+    assert rectification["within_share"] == pytest.approx((frames - hidden) / frames)
+    assert rectification["corner_rmse_px"] < 1.5
+    by_pair = {group["class_pair"]: group for group in measured["pairs"]}
+    unseen = {"worker-wheel_loader": 0, "worker-excavator": len(drawn_clip.UNSEEN)}
+    for name, group in by_pair.items():
+        scores = group["scores"]
+        assert scores["after the filter"]["frames"] == frames
+        assert scores["after the filter"]["measured"] == frames - hidden - unseen[name]
+        assert scores["after, failures filled"]["measured"] == frames - unseen[name]
+        assert sum(group["missing_by_reason"].values()) == hidden + unseen[name]
+
+
+def test_the_papers_benchmark_is_scored_against_truth_as_well(measured: dict[str, Any]) -> None:
+    for group in measured["pairs"]:
+        benchmark = group["scores"]["benchmark itself"]
+        assert benchmark["measured"] >= drawn_clip.FRAMES - 4
+        assert 0.0 < benchmark["made_m"] < tolerances.DRAWN_SITE_M[measured["trial"]["method"]]
+
+
+def test_every_figure_of_the_mobile_test_stands_beside_the_papers(measured: dict[str, Any]) -> None:
+    figures = figures_of(measured)
+    wanted = {name for name in PUBLISHED if name.startswith(("mobile", "ale"))}
+    assert wanted | {"rectification time"} == set(figures)
+    made = figures["mobile made worker-wheel_loader"]
+    assert made["paper"] == 0.33
+    assert made["count"] == drawn_clip.FRAMES - len(drawn_clip.HIDDEN)
+    assert made["of"] == drawn_clip.FRAMES
+
+
+def test_box_errors_make_ale(clip_folder: Path) -> None:
+    words = ("--detector", "noisy", "--box-error", "3", "--method", "oriented", "--json", "-")
+    one, again, other = (json.loads(evaluate(clip_folder, *words, "--seed", seed))["clips"][0] for seed in (5, 5, 6))
+    assert one["localisation"][0]["ale_m"] == again["localisation"][0]["ale_m"] != other["localisation"][0]["ale_m"]
+    made_m = [clip["pairs"][0]["scores"]["after the filter"]["made_m"] for clip in (one, again)]
+    assert made_m[0] == pytest.approx(made_m[1])
+    ale = figures_of(one)["ale worker"]["measured"]
+    # A centre of two edges, each 3 px off: 2.1 px a coordinate, 2.7 px on the average, of 3 cm or so.
+    assert 0.03 < ale < 0.15
+
+
+def test_one_page_shows_it_all(clip_folder: Path, board_folder: Path, tmp_path: Path) -> None:
+    out = evaluate(clip_folder, board_folder, "--report", tmp_path / "sub" / "r.html")
+    assert "beside the paper" in out and "0.33 m" in out and "93.51 %" in out
+    page = (tmp_path / "sub" / "r.html").read_text(encoding="utf-8")
+    assert page.count("<svg") == 4
+    assert "data:image/jpeg;base64," in page
+    assert not re.search(r"(src|href)=\"(?!data:|#)", page)
+    assert "93.51 %" in page and "37 frames" in page and "too few edges" in page
+    assert "NaN" not in page and "nan" not in re.sub(r"base64,[^\"]*", "", page)
+
+
+def test_the_lab_test_on_a_drawn_board(board_folder: Path) -> None:
+    (clip,) = json.loads(evaluate(board_folder, "--json", "-"))["clips"]
+    board, figures = clip["board"], figures_of(clip)
+    assert board["frames"] == drawn_board.FRAMES and board["measured"] == drawn_board.FRAMES - 1
+    assert board["before"][drawn_board.EMPTY] is None
+    assert board["corner_rmse_px"] < 0.3
+    assert board["exact_after_percent"] == pytest.approx(100.0)
+    assert 95.0 < board["after_percent"] < 100.0
+    assert board["after_percent"] < board["after_pose_percent"] <= 100.0
+    assert board["before_percent"] < board["after_percent"]
+    assert board["worst_frame"] == drawn_board.FRAMES - 1
+    assert np.nanmean(np.array(board["before"], float)) == pytest.approx(board["before_percent"])
+    assert {name for name in PUBLISHED if name.startswith("board")} == set(figures)
+    assert figures["board before"]["count"] == drawn_board.FRAMES - 1
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ((), "neither"),
+        (("clip", "--all"), "both"),
+        (("clip", "--detector", "noisy"), "--box-error"),
+        (("clip", "--box-error", "3"), "--detector noisy"),
+        (("clip", "--detector", "noisy", "--box-error", "wide"), "wide"),
+        (("clip", "--detector", "noisy", "--box-error", "-3"), "-3"),
+        (("clip", "--detector", "no-such.onnx"), "no-such.onnx"),
+        (("--all",), "--clips"),
+    ],
+)
+def test_words_that_make_no_sense_are_refused(words: tuple[str, ...], said: str) -> None:
+    with pytest.raises(ConfigError, match=re.escape(said)):
+        evaluate(*words)
