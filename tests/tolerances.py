@@ -73,7 +73,7 @@ HULL_BOX_PX = 0.02
 FOOT_ON_GROUND_M = 0.02
 """The lowest vertex of a person against the ground: the sole rests exactly, a knee may dip in far postures."""
 
-RENDERED_EDGE_PX = {"pinhole": 0.05, "lens": 0.75, "shaded": 0.15}
-"""Rendered outlines against projected corners. Pinhole: positions are snapped to 1/256 px. Lens: each pixel takes the id
-of the nearest centre of the pinhole picture, at most half a diagonal away. Shaded: four samples a pixel, an 8-bit edge in
-the tone curve's bend and a grainy ground beside it."""
+RENDERED_EDGE_PX = {"pinhole": 0.05, "lens": 0.75, "shaded": 0.08}
+"""Rendered outlines against projected corners. Pinhole: positions are snapped to 1/256 px. Lens: each pixel takes the
+id of the nearest centre of the pinhole picture, at most half a diagonal away. Shaded: an edge through 25 lines of four
+samples a pixel, and the grain of the surfaces beside it."""

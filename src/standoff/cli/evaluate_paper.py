@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from standoff.cli.numbers import two_integers
 from standoff.core.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -66,7 +65,7 @@ def paper(
             fix="write for example `standoff evaluate paper clips/mobile`",
         )
     if every_preset:
-        folders = _every_preset(clips_folder, seed, _size(size), frames)
+        folders = _every_preset(clips_folder, seed, size, frames)
     results = _evaluate(folders, trial)
     if report is not None:
         write_report(results, report)
@@ -109,23 +108,17 @@ def _box_error(detector: str, text: str | None) -> BoxError:
     return BoxError(share=number / 100.0) if text.endswith("%") else BoxError(px=number)
 
 
-def _size(text: str | None) -> tuple[int | None, int | None]:
-    if text is None:
-        return None, None
-    return two_integers(text, "x", expected="--size WIDTHxHEIGHT", example="1280x720")
-
-
-def _every_preset(
-    folder: Path | None, seed: int, size_px: tuple[int | None, int | None], frames: int | None
-) -> list[Path]:
+def _every_preset(folder: Path | None, seed: int, size: str | None, frames: int | None) -> list[Path]:
     """Return a folder for each preset; render what is not there yet."""
+    from standoff.cli.simulate import parse_size
     from standoff.simulation.presets import PRESETS, plan_clip
     from standoff.simulation.record import record_clip
 
     if folder is None:
         raise ConfigError(expected="--clips FOLDER with --all", found="none", fix="say where the clips are or shall be")
+    width_px, height_px = parse_size(size)
     plans = {
-        folder / name: plan_clip(name, seed=seed, width_px=size_px[0], height_px=size_px[1], frames=frames)
+        folder / name: plan_clip(name, seed=seed, width_px=width_px, height_px=height_px, frames=frames)
         for name in PRESETS
         if not (folder / name / "scene.json").is_file()
     }

@@ -47,15 +47,20 @@ class Canvas:
         return self.height_px, self.width_px
 
     def pixels(self, points_m: Path | FloatArray) -> npt.NDArray[np.int32]:
-        """Return (N, 2) fixed-point pixels for OpenCV's drawing with `shift=4`."""
+        """Return (..., 2) fixed-point pixels of points (..., 2) for OpenCV's drawing with `shift=4`."""
         middle = np.array([self.width_px, self.height_px]) / 2 - 0.5
         placed = (np.asarray(points_m) * self.px_per_m + middle) * 2**_FRACTION_BITS
         return np.asarray(np.round(placed), np.int32)
 
-    def draw(self, layer: npt.NDArray[np.uint8], lines_m: Sequence[FloatArray], value: int, width_m: float) -> None:
-        """Draw polylines (each (N, 2), metres) with soft edges."""
+    def draw(
+        self, layer: npt.NDArray[np.uint8], lines_m: Sequence[FloatArray] | FloatArray, value: int, width_m: float
+    ) -> None:
+        """Draw polylines (each (N, 2), metres, or (L, N, 2) all at once) with soft edges."""
         thickness_px = max(1, round(width_m * self.px_per_m))
-        lines = [self.pixels(line) for line in lines_m]
+        if isinstance(lines_m, np.ndarray):
+            lines = list(self.pixels(lines_m))
+        else:
+            lines = [self.pixels(line) for line in lines_m]
         cv2.polylines(layer, lines, False, value, thickness_px, cv2.LINE_AA, _FRACTION_BITS)
 
     def fill(self, layer: npt.NDArray[np.uint8], outlines_m: Sequence[Path | FloatArray], value: int) -> None:

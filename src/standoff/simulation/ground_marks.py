@@ -10,7 +10,7 @@ from standoff.simulation.canvas import Canvas, Picture, fractal
 from standoff.simulation.terrain_plan import Path, TerrainPlan
 
 _NEUTRAL = 128
-_SPILLS = ("#cfc6b2", "#c9c7c0", "#8d5f4a", "#3a3733", "#b59b72", "#d9d4c6")
+_SPILLS = ("#cfc6b2", "#c9c7c0", "#957a68", "#3a3733", "#b59b72", "#d9d4c6")
 _SPRAYS = ((222, 220, 210), (206, 84, 60), (70, 120, 190), (214, 190, 70))
 
 
@@ -68,7 +68,7 @@ def _roll(rng: np.random.Generator, canvas: Canvas, layer: Picture, line_m: Floa
         )
         arm = across * width_m / 2 + ahead * slant * width_m / 2
         bars.append(np.stack([middle - arm, middle + arm], axis=1))
-    canvas.draw(layer, list(np.concatenate(bars)), _NEUTRAL - int(0.8 * abs(pressed)), 0.11)
+    canvas.draw(layer, np.concatenate(bars), _NEUTRAL - int(0.8 * abs(pressed)), 0.11)
 
 
 def _smear(rng: np.random.Generator, canvas: Canvas, layer: Picture, centre_m: FloatArray) -> None:

@@ -26,7 +26,7 @@ from standoff.simulation.scene import Actor, Reference
 from standoff.simulation.sensor import VideoWriter
 from standoff.simulation.site import Site, build_site
 from standoff.simulation.studio import Shot, Studio
-from standoff.simulation.telemetry import write_telemetry
+from standoff.simulation.telemetry import ShownSettings, write_telemetry
 from standoff.simulation.truth import FRAMES_SCHEMA, PAIRS_SCHEMA, TRUTH_SCHEMA, Row
 from standoff.stages.ground import save_camera
 
@@ -86,7 +86,8 @@ def record_clip(
         save_camera(site.camera, folder / "camera.yaml")
         _save_reference(site.scene.reference, folder / "reference.yaml")
         errors = np.random.default_rng([plan.seed, 1299709])
-        write_telemetry(folder / "telemetry.srt", site.scene.flight, times_s, errors)
+        shown = ShownSettings(iso=round(site.sensor.iso), shutter_hz=1 / site.shutter_s)
+        write_telemetry(folder / "telemetry.srt", site.scene.flight, times_s, errors, shown)
 
 
 @contextmanager

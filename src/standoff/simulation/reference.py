@@ -15,8 +15,8 @@ from standoff.core.errors import ConfigError
 from standoff.core.homography import FloatArray
 from standoff.simulation.bars import quads
 from standoff.simulation.mesh import Colour, Mesh, Surface, box, join, rotation, srgb, translation
-from standoff.simulation.props.concrete_works import starters
 from standoff.simulation.props.materials import block, relief, toned
+from standoff.simulation.props.rebar import starters
 from standoff.simulation.scene import Ground, Reference, place
 
 SQUARE_FOOTING_M = 2.89

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from types import MappingProxyType
@@ -27,7 +27,9 @@ _LEVEL_UNIT = 64  # a grey level in the table of standard deviations
 _TILE_SEED = 20_011
 _LUMA_GRAIN_PX, _CHROMA_GRAIN_PX = 0.55, 2.6
 _CHROMA_SHARE = 0.45
-_READ_ELECTRONS = 3.0
+_READ_ELECTRONS = 2.0
+_STEEPEST = 5.0  # of the tone curve: cameras flatten the darks, where sRGB has 12.9
+_SMEAR, _MIDDLE_LEVEL = 2.0, 110
 _PRESET = "veryfast"
 
 _ISO: Mapping[Condition, float] = MappingProxyType(
@@ -74,17 +76,19 @@ class Sensor:
     @classmethod
     def _set(cls, condition: Condition, factor: float, rng: np.random.Generator) -> Self:
         iso = float(np.clip(_ISO[condition] * factor, 100.0, 12_800.0))
-        gain = np.log2(iso / 100.0)
-        return cls(
+        gain = float(np.log2(iso / 100.0))
+        camera = cls(
             iso=iso,
-            full_well=14_000.0 / factor,
+            full_well=18_000.0 / factor,
             softness_px=float(np.clip(0.45 * factor**0.5, 0.3, 0.8)),
-            smear_levels=1.0 + 0.9 * gain,
-            sharpening=float(np.clip(0.55 * factor**0.7, 0.2, 1.1)),
-            halo_px=1.0 + 0.08 * gain,
+            smear_levels=0.0,
+            sharpening=float(np.clip(0.6 * factor**0.7 * 0.9**gain, 0.2, 1.1)),
+            halo_px=1.0 + 0.1 * gain,
             jpeg_quality=None,
             drift_ev=BandNoise.draw(rng, (0.05, 0.3), 0.05),
         )
+        # a denoiser is set by the noise that it has to expect
+        return replace(camera, smear_levels=float(_SMEAR * camera.noise_levels()[_MIDDLE_LEVEL]))
 
     def exposure_at(self, time_s: float) -> float:
         """Return the factor on light by which the automatic exposure is off at a moment."""
@@ -96,7 +100,8 @@ class Sensor:
         linear = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
         slope = np.where(linear <= 0.0031308, 12.92, 1.055 / 2.4 * np.maximum(linear, 0.0031308) ** (1 / 2.4 - 1))
         white = self.full_well * 100.0 / self.iso
-        deviation: FloatArray = np.sqrt(linear / white + (_READ_ELECTRONS / white) ** 2) * slope * 255.0
+        linear_deviation = np.sqrt(linear / white + (_READ_ELECTRONS / white) ** 2)
+        deviation: FloatArray = linear_deviation * np.minimum(slope, _STEEPEST) * 255.0
         return deviation
 
     def expose(self, image: ImageArray, rng: np.random.Generator) -> ImageArray:

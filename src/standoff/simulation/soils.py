@@ -55,7 +55,7 @@ def _lows(plan: TerrainPlan, height_m: Float32Array, canvas: Canvas) -> Float32A
     across = 2 * round(1.2 / plan.cell_m) + 1
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (across, across))
     filled, planed = (cv2.morphologyEx(height_m, kind, disc) for kind in (cv2.MORPH_CLOSE, cv2.MORPH_OPEN))
-    low_m = cv2.GaussianBlur(np.clip(filled - height_m, 0.0, 0.15) - np.clip(height_m - planed, 0.0, 0.15), None, 0.8)
+    low_m = cv2.GaussianBlur(np.clip(filled - height_m, 0.0, 0.15) - np.clip(height_m - planed, 0.0, 0.15), None, 1.2)
     step = 1.0 / (canvas.px_per_m * plan.cell_m)
     to_grid = np.array([[step, 0.0, 0.5 * step], [0.0, step, 0.5 * step]])
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
@@ -65,7 +65,7 @@ def _lows(plan: TerrainPlan, height_m: Float32Array, canvas: Canvas) -> Float32A
 
 def _wetness(rng: np.random.Generator, plan: TerrainPlan, lows: Float32Array) -> Float32Array:
     """Return 0 dry .. 1 under water: water gathers in the lows, dampness spreads around it."""
-    gathers = np.clip(lows, -0.1, 0.1) / 0.05
+    gathers = np.clip(lows, -0.1, 0.1) / 0.03
     gathers += fractal(rng, (lows.shape[0], lows.shape[1]), 4, 256, gain=0.6)
     sample = gathers[::8, ::8]
     damp_from, damp_full = np.quantile(sample, [0.95 - 0.75 * plan.moisture, 0.999])
@@ -194,5 +194,5 @@ def _grow(rng: np.random.Generator, plan: TerrainPlan, coarse: Canvas, levels: P
 def _drift(rng: np.random.Generator, albedo: Picture) -> None:
     """Let the hue wander by a few per cent over tens of metres."""
     gain = 128.0 + 4.0 * rng.standard_normal((7, 7, 1)) + 1.3 * rng.standard_normal((7, 7, 3))
-    field = cv2.resize(gain.astype(np.float32), albedo.shape[1::-1][:2], interpolation=cv2.INTER_CUBIC)
-    cv2.multiply(albedo, cv2.convertScaleAbs(field), albedo, scale=1.0 / 128.0)
+    field = cv2.convertScaleAbs(cv2.resize(gain.astype(np.float32), (128, 128), interpolation=cv2.INTER_CUBIC))
+    cv2.multiply(albedo, cv2.resize(field, albedo.shape[1::-1][:2]), albedo, scale=1.0 / 128.0)

@@ -129,9 +129,9 @@ _PAVED = ("#7d7a74", "#8d897f", "#6f7257", "#5f6b45", "#99927f")
 _GREEN = ("#5d6a41", "#77804f", "#8b8459", "#a2966d", "#4f5f39", "#8a7a5f")
 _CHARACTERS = {
     Setting.CITY: _Character(_PAVED, Surface.CONCRETE, FLATS, 0.9, (24.0, 62.0, 105.0, 160.0), 0.85, (25, 120), 12),
-    Setting.SUBURB: _Character(_GREEN, Surface.FOLIAGE, COTTAGES, 0.75, (24.0, 52.0, 90.0), 0.7, (30, 180), 4),
+    Setting.SUBURB: _Character(_GREEN, Surface.FOLIAGE, COTTAGES, 0.75, (24.0, 52.0, 90.0), 0.7, (28, 140), 4),
     Setting.INDUSTRY: _Character(_PAVED, Surface.CONCRETE, SHEDS, 0.7, (30.0, 95.0, 170.0), 0.6, (20, 150), 3),
-    Setting.COUNTRY: _Character(_GREEN, Surface.FOLIAGE, (*COTTAGES, SHEDS[2]), 0.08, (40.0, 120.0), 0.4, (35, 220), 0),
+    Setting.COUNTRY: _Character(_GREEN, Surface.FOLIAGE, (*COTTAGES, SHEDS[2]), 0.08, (40.0, 120.0), 0.4, (32, 170), 0),
 }
 
 
@@ -188,14 +188,14 @@ def _shade(town: _Town, sides: Sequence[_Side], to_sun: FloatArray) -> None:
     side = sides[int(np.argmax([direction @ to_sun[:2] for direction in outwards]))]
     slope = to_sun[2] / max(float(np.hypot(*to_sun[:2])), 1e-3)
     shade_m = rng.uniform(0.3, 1.2) * side.half_m[1] + 12.0
-    floors = int(np.clip(round(shade_m * slope / 3.0), 4, 24))
+    floors = 2 * int(np.clip(round(shade_m * slope / 6.0), 2, 12))
     house = House((int(rng.choice([10, 14, 18])), 5), floors)
     length_m, depth_m, height_m = house.size_m
     centre = side.at(float(rng.uniform(-0.5, 0.5)) * side.half_m[0], 5.0 + depth_m / 2)
     if not town.free(_outline(centre, (length_m, depth_m + 2.0), side.turn_deg)):
         return
     wall = np.array(WALLS[int(rng.integers(len(WALLS)))])
-    town.put(building(house, int(rng.integers(3))), centre, side.turn_deg, np.ones(3), wall)
+    town.put(building(house), centre, side.turn_deg, np.ones(3), wall)
     if rng.random() < 0.5:
         front = centre + (depth_m / 2) * (side.at(0.0, 0.0) - side.at(0.0, 1.0))
         net = np.array(srgb(("#3f6f58", "#c9c9c4", "#4f6f97", "#8a8f8c")[int(rng.integers(4))]))

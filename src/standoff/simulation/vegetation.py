@@ -33,7 +33,7 @@ def tree(variant: int) -> Mesh:
         away_m = 0.0 if lobe == 0 else rng.uniform(0.5, 1.0 if slim else 1.9)
         turn = rng.uniform(0.0, 2 * np.pi)
         middle = np.array([away_m * np.cos(turn), away_m * np.sin(turn), trunk_m + rng.uniform(1.5, 4.2)])
-        lobes.append(_crown(rng, middle, radius_m, detail=1, tufts=45))
+        lobes.append(_crown(rng, middle, radius_m, detail=1, tufts=38))
     return join(lobes)
 
 

@@ -18,7 +18,7 @@ RATES_PS = MappingProxyType({"swing_deg": 55.0, "boom_deg": 30.0, "arm_deg": 45.
 
 _CYCLE_S = (15.0, 20.0)  # of loading trucks at 90 deg swing, as production handbooks have it
 _BUCKETS_A_TRUCK = (5, 8)
-_OVER_BED_M = 0.9  # of the open bucket's edge, which dips a little as it opens
+_OVER_BED_M = 1.3  # of the open bucket's edge, which dips a little as it opens
 _BED_M = -1.2  # middle of a truck's bed, ahead of its middle
 
 Cycle = Callable[[], list[Stance]]

@@ -19,12 +19,12 @@ void main() {
     vec4 broad = texture(noise, mat2(0.81, 0.59, -0.59, 0.81) * v_xy * 0.043);
     float puddle = smoothstep(0.72, 0.9, wet + 0.15 * (broad.r - 0.5));
     float rough = 1.0 - puddle;
-    albedo *= 1.0 + rough * (0.75 * (fine.r - 0.5) + 0.5 * (broad.r - 0.5));
+    albedo *= 1.0 + rough * (1.1 * (fine.r - 0.5) + 0.55 * (broad.r - 0.5));
     float stone = fine.g * smoothstep(0.35, 0.75, broad.g + broad.r);
     albedo = mix(albedo, mix(albedo, vec3(dot(albedo, vec3(0.3, 0.5, 0.2))), 0.6) * (0.9 + 0.9 * fine.r), 0.55 * stone * rough);
     albedo *= mix(1.0, 0.42, smoothstep(0.05, 0.7, wet));
     vec3 normal = normalize(v_normal);
-    normal = normalize(normal - rough * vec3(1.5 * (fine.ba - 0.5) + 0.5 * (broad.ba - 0.5), 0.0));
+    normal = normalize(normal - rough * vec3(1.5 * (fine.ba - 0.5), 0.0));
     normal = normalize(mix(normal, vec3(0.0, 0.0, 1.0), puddle));
     float roughness = mix(mix(0.95, 0.45, smoothstep(0.2, 0.8, wet)), 0.07, puddle);
     float open = texture(openness, gl_FragCoord.xy * openness_scale).r;

@@ -25,13 +25,13 @@ void main() {
     float radius_px = clamp(2.2 * depth_range.w / centre.z, 3.0 * step_px, 220.0);
     float turn = 6.2832 * fract(52.9829189 * fract(dot(floor(gl_FragCoord.xy), vec2(0.06711056, 0.00583715))));
     float hidden = 0.0;
-    const int TAPS = 16;
+    const int TAPS = 18;
     for (int i = 0; i < TAPS; i++) {
         float share = (float(i) + 0.5) / float(TAPS);
-        float angle = turn + 2.39996 * float(i) * 1.0;
-        vec3 toward = point(pixel + radius_px * share * share * vec2(cos(angle), sin(angle))) - centre;
+        float angle = turn + 2.39996 * float(i);
+        vec3 toward = point(pixel + radius_px * share * sqrt(share) * vec2(cos(angle), sin(angle))) - centre;
         float squared = dot(toward, toward);
-        hidden += max(dot(toward, normal) - 0.02 - 0.0008 * centre.z, 0.0) * inversesqrt(squared + 0.001) / (1.0 + 0.25 * squared);
+        hidden += max(dot(toward, normal) - 0.015 - 0.0007 * centre.z, 0.0) * inversesqrt(squared + 0.001) / (1.0 + 0.25 * squared);
     }
-    open = clamp(1.0 - 1.9 * hidden / float(TAPS), 0.12, 1.0);
+    open = max(exp(-3.4 * hidden / float(TAPS)), 0.1);
 }
