@@ -77,3 +77,15 @@ RENDERED_EDGE_PX = {"pinhole": 0.05, "lens": 0.75, "shaded": 0.08}
 """Rendered outlines against projected corners. Pinhole: positions are snapped to 1/256 px. Lens: each pixel takes the
 id of the nearest centre of the pinhole picture, at most half a diagonal away. Shaded: an edge through 25 lines of four
 samples a pixel, and the grain of the surfaces beside it."""
+
+VISIBLE_BOX_PX = 1.0
+"""A projected box against pixels whose centres are covered: half a pixel of sampling on each side, and thin tips."""
+
+BOARD_IN_PICTURE_PX = 0.1
+"""cornerSubPix on a rendered board through a lens, 4 samples a pixel, against the projected corners."""
+
+FOOTING_IN_PICTURE_PX = 0.1
+"""Lines fitted to a rendered footing's edges against its projected corners, as the issue asks."""
+
+SCENE_DISTANCE_M = 1e-3
+"""The clip's distances against the actors' own coordinates: what the issue asks; both are float64."""

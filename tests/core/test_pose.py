@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tolerances import DISTORTION_PX, GEOMETRY_REL
 
 from standoff.core import homography
 from standoff.core.camera import Camera
 from standoff.core.homography import FloatArray
 from standoff.core.pose import View
-from tolerances import DISTORTION_PX, GEOMETRY_REL
 
 _CAMERA = Camera(
     1920,

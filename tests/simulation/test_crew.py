@@ -31,7 +31,7 @@ def test_results_come_in_the_order_of_the_jobs(processes: int) -> None:
 
 @pytest.mark.parametrize("processes", [1, 2])
 def test_an_error_in_a_worker_reaches_the_caller_as_it_was(processes: int) -> None:
-    with pytest.raises(DataError, match="found job 4. Skip it"):
+    with pytest.raises(DataError, match=r"found job 4\. Skip it"):
         list(work_through(partial(_squares, stop_at=4), range(9), processes=processes))
 
 

@@ -47,5 +47,8 @@ def test_a_used_folder_a_file_and_a_forbidden_place_are_refused(tmp_path: Path) 
         pass
     with pytest.raises(OutputError, match="the file"), whole_folder(tmp_path / "used" / "a.txt", overwrite=True):
         pass
-    with pytest.raises(OutputError, match="written to"), whole_folder(tmp_path / "used" / "a.txt" / "b", overwrite=True):
+    with (
+        pytest.raises(OutputError, match="written to"),
+        whole_folder(tmp_path / "used" / "a.txt" / "b", overwrite=True),
+    ):
         pass

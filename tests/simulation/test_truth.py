@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 import pytest
 from pycocotools import mask as coco_mask
+from tolerances import HULL_BOX_PX
 
 from standoff.core.camera import Camera
 from standoff.core.pose import View
@@ -20,7 +21,6 @@ from standoff.simulation.truth import (
     pair_rows,
     visible_boxes_px,
 )
-from tolerances import HULL_BOX_PX
 
 _CAMERA = Camera(
     640, 360, np.array([[480.0, 0.0, 319.5], [0.0, 480.0, 179.5], [0.0, 0.0, 1.0]]), np.array([-0.12, 0.03, 0, 0, 0])
@@ -28,7 +28,9 @@ _CAMERA = Camera(
 _VIEW = View.aimed(_CAMERA, np.array([0.0, -20.0, 20.0]), heading_deg=0.0, pitch_deg=45.0)
 
 
-def _body(entity_id: int, class_id: int, x_m: float, y_m: float, tip_m: tuple[float, float, float] | None = None) -> Body:
+def _body(
+    entity_id: int, class_id: int, x_m: float, y_m: float, tip_m: tuple[float, float, float] | None = None
+) -> Body:
     square = np.array([[-1.0, -0.5], [1.0, -0.5], [1.0, 0.5], [-1.0, 0.5]])
     return Body(
         entity_id,
@@ -38,20 +40,24 @@ def _body(entity_id: int, class_id: int, x_m: float, y_m: float, tip_m: tuple[fl
         np.array([x_m, y_m, 0.0]),
         0.0,
         np.array([1.0, 0.0]),
-        square + (x_m, y_m),
+        square + np.array([x_m, y_m]),
         np.full(3, np.nan) if tip_m is None else np.array(tip_m),
     )
 
 
 def _moment(*bodies: Body) -> Moment:
-    return Moment(0.5, _VIEW, bodies, (), False)
+    return Moment(0.5, _VIEW, bodies, (), (), False)
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_the_full_box_is_that_of_every_vertex(seed: int) -> None:
     rng = np.random.default_rng(seed)
     shape = ball((1.0, 0.5, 2.0), None, surface=box((1, 1, 1), None).surface[0])
-    pose = translation(float(rng.uniform(-5, 5)), float(rng.uniform(-5, 5)), 1.0) @ rotation("z", float(rng.uniform(0, 360))) @ rotation("x", 30.0)
+    pose = (
+        translation(float(rng.uniform(-5, 5)), float(rng.uniform(-5, 5)), 1.0)
+        @ rotation("z", float(rng.uniform(0, 360)))
+        @ rotation("x", 30.0)
+    )
     every_px = _VIEW.project(shape.vertices_m @ pose[:3, :3].T + pose[:3, 3])
     expected = np.concatenate([every_px.min(axis=0), every_px.max(axis=0)])
     np.testing.assert_allclose(full_box_px([place(shape, pose)], _VIEW), expected, atol=HULL_BOX_PX)

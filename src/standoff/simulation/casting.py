@@ -158,7 +158,7 @@ def _nobody(rng: np.random.Generator, stage: Stage) -> Cast:
     return Cast()
 
 
-def crowd(rng: np.random.Generator, stage: Stage, *, workers: int, machines: int) -> Cast:
+def crowd(rng: np.random.Generator, stage: Stage, *, workers: int, machines: int, parked: int = 0) -> Cast:
     """Draw activities until there are so many workers and machines, or no room is left.
 
     Args:
@@ -166,6 +166,7 @@ def crowd(rng: np.random.Generator, stage: Stage, *, workers: int, machines: int
         stage: Where.
         workers: Wanted.
         machines: Wanted.
+        parked: Vehicles that stand on the site besides, at most.
     """
     cast = Cast()
     keep = _reserve_reference(stage)
@@ -176,6 +177,9 @@ def crowd(rng: np.random.Generator, stage: Stage, *, workers: int, machines: int
         if left <= 0:
             break
         cast.add(*_machine_activity(rng, stage, left, workers))
+    for _ in range(parked):
+        vehicle = make_vehicle(rng)
+        cast.add([vehicle], [behaviour.idle(rng, vehicle, _spot(rng, stage), stage.duration_s)])
     for _ in range(_TRIES * workers):
         left = workers - sum(is_person(actor.model) for actor in cast.actors)
         if left <= 0:
@@ -294,7 +298,9 @@ def _any_number(rng: np.random.Generator, stage: Stage) -> Cast:
     """Few or many: now and then an empty site, so that a picture without people is nothing unusual."""
     if rng.random() < 0.05:
         return Cast()
-    return crowd(rng, stage, workers=int(rng.integers(1, 13)), machines=int(rng.integers(0, 7)))
+    return crowd(
+        rng, stage, workers=int(rng.integers(1, 13)), machines=int(rng.integers(0, 7)), parked=int(rng.integers(0, 4))
+    )
 
 
 CASTS: Mapping[str, Callable[[np.random.Generator, Stage], Cast]] = MappingProxyType(

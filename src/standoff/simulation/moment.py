@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -22,7 +23,7 @@ class Body:
         entity_id: Of the truth.
         class_id: Of `standoff.core.classes`.
         batches: All its parts, site frame.
-        carried: What it carries, not counted to it.
+        carried: What goes with it but does not count to it: loads that people carry, what is under the ground.
         centre_m: (3,) middle of its footprint on the ground, site frame.
         heading_rad: Of its local x, counter-clockwise from east.
         velocity_mps: (2,) site frame.
@@ -49,6 +50,7 @@ class Moment:
         time_s: Since the scene's start.
         view: The camera.
         bodies: Actors and, last, the reference object.
+        parked: Vehicles that stand still all the time, among the scene's props.
         loose: Batches that the truth does not name but that change with time (covers of the reference).
         reference_covered: Something lies on the reference object.
     """
@@ -56,6 +58,7 @@ class Moment:
     time_s: float
     view: View
     bodies: tuple[Body, ...]
+    parked: tuple[Body, ...]
     loose: tuple[Batch, ...]
     reference_covered: bool
 
@@ -73,7 +76,8 @@ def scene_at(scene: Scene, time_s: float) -> Moment:
         bodies.append(_reference_body(scene.reference))
         for cover in scene.reference.covers:
             loose += _risen(cover, time_s)
-    return Moment(time_s, scene.flight.view(time_s), tuple(bodies), tuple(loose), bool(loose))
+    parked = tuple(map(_parked_body, scene.parked))
+    return Moment(time_s, scene.flight.view(time_s), tuple(bodies), parked, tuple(loose), bool(loose))
 
 
 def _actor_body(actor: Actor, time_s: float, ground: Ground) -> Body:
@@ -97,13 +101,31 @@ def _actor_body(actor: Actor, time_s: float, ground: Ground) -> Body:
     )
 
 
+@lru_cache(maxsize=1024)
+def _parked_body(batch: Batch) -> Body:
+    local_to_site = batch.poses[0].astype(np.float64)
+    low, high = batch.mesh.vertices_m[:, :2].min(axis=0), batch.mesh.vertices_m[:, :2].max(axis=0)
+    outline = np.array([low, (high[0], low[1]), high, (low[0], high[1])], dtype=np.float64)
+    return Body(
+        batch.entity_id,
+        CLASS_BY_NAME["vehicle"].id,
+        (batch,),
+        (),
+        local_to_site[:3, 3],
+        float(np.arctan2(local_to_site[1, 0], local_to_site[0, 0])),
+        np.zeros(2),
+        outline @ local_to_site[:2, :2].T + local_to_site[:2, 3],
+        np.full(3, np.nan),
+    )
+
+
 def _reference_body(reference: Reference) -> Body:
     edge = reference.base_m[1] - reference.base_m[0]
     return Body(
         reference.entity_id,
         CLASS_BY_NAME["reference"].id,
         reference.batches,
-        (),
+        reference.roots,
         reference.base_m.mean(axis=0),
         float(np.arctan2(edge[1], edge[0])),
         np.zeros(2),

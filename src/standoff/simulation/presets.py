@@ -26,7 +26,7 @@ class CoverPlan:
     """What lies on the reference object, and when.
 
     Attributes:
-        kind: Of `standoff.simulation.reference.make_cover`.
+        kind: of `standoff.simulation.covers.make_cover`.
         start: When it appears, as a share of the clip.
         stop: When it is gone, as a share of the clip.
     """

@@ -58,7 +58,7 @@ def make_reference(
     """
     if kind not in _MAKERS:
         raise ConfigError(expected=f"one of {', '.join(_MAKERS)}", found=repr(kind), fix="choose one of these shapes")
-    corners_m, height_m, mesh = _MAKERS[kind](rng, worn)
+    corners_m, height_m, mesh, root = _MAKERS[kind](rng, worn)
     upright = translation(*centre_xy_m, 0.0) @ rotation("z", heading_deg)
     flat_site = _through(upright, corners_m, 0.0)[:, :2]
     grid = _bilinear(flat_site, 9).reshape(-1, 2)
@@ -66,8 +66,9 @@ def make_reference(
     pose = (translation(0.0, 0.0, level_m) @ upright).astype(np.float32).astype(np.float64)
     top_m = _through(pose, corners_m, height_m)
     base_m = np.column_stack([top_m[:, :2], ground.height_at(top_m[:, :2])])
-    batch = place(mesh, pose, dust=float(rng.uniform(0.05, 0.3)) if worn else 0.0, entity_id=entity_id)
-    return Reference(top_m, base_m, (batch,), (), entity_id)
+    dust = float(rng.uniform(0.05, 0.3)) if worn else 0.0
+    seen, buried = place(mesh, pose, dust=dust, entity_id=entity_id), place(root, pose, dust=dust)
+    return Reference(top_m, base_m, (seen,), (buried,), (), entity_id)
 
 
 def board_corners_m(reference: Reference) -> FloatArray:
@@ -119,18 +120,25 @@ def _through(pose: FloatArray, corners_m: FloatArray, z_m: float) -> FloatArray:
 def _prism(corners_m: FloatArray, height_m: float, colour: Colour, surface: Surface, stains: float) -> Mesh:
     """Return a block with exact corners, its faces cut finely enough to carry stains."""
     count = 9 if stains else 2
-    closed = np.vstack([corners_m, corners_m[:1]])
-    steps = np.linspace(0.0, 1.0, count)[:, None]
     top = _bilinear(corners_m, count)
     faces = [np.concatenate([top, np.full((*top.shape[:2], 1), height_m)], axis=-1)]
-    for start, stop in pairwise(closed):
-        line = start * (1 - steps) + stop * steps
-        faces.append(np.stack([np.column_stack([line, np.full(count, z)]) for z in (height_m, 0.0, -_ROOT_M)]))
+    faces += _sides(corners_m, height_m, 0.0, count)
     return join([relief(face, colour, surface, mottling=stains) for face in faces])
 
 
-Made = tuple[FloatArray, float, Mesh]
-"""(4, 2) corners in the local frame, height of the top, look."""
+def _root(corners_m: FloatArray, colour: Colour, surface: Surface) -> Mesh:
+    """Return the sides below the ground, so that no gap shows where it is not quite level."""
+    return join([relief(face, colour, surface) for face in _sides(corners_m, 0.0, -_ROOT_M, 2)])
+
+
+def _sides(corners_m: FloatArray, high_m: float, low_m: float, count: int) -> list[FloatArray]:
+    steps = np.linspace(0.0, 1.0, count)[:, None]
+    lines = [start * (1 - steps) + stop * steps for start, stop in pairwise(np.vstack([corners_m, corners_m[:1]]))]
+    return [np.stack([np.column_stack([line, np.full(count, z)]) for z in (high_m, low_m)]) for line in lines]
+
+
+Made = tuple[FloatArray, float, Mesh, Mesh]
+"""(4, 2) corners in the local frame, height of the top, look above the ground and below it."""
 
 
 def _footing(rng: np.random.Generator, corners_m: FloatArray, height_m: float, worn: bool) -> Made:
@@ -138,7 +146,7 @@ def _footing(rng: np.random.Generator, corners_m: FloatArray, height_m: float, w
     parts = [_prism(corners_m, height_m, colour, Surface.CONCRETE, 0.1 if worn else 0.0)]
     if worn and rng.uniform() < 0.6:
         parts += _stub(rng, height_m, colour)
-    return corners_m, height_m, join(parts)
+    return corners_m, height_m, join(parts), _root(corners_m, colour, Surface.CONCRETE)
 
 
 def _stub(rng: np.random.Generator, height_m: float, colour: Colour) -> list[Mesh]:
@@ -162,8 +170,8 @@ def _make_quadrilateral_footing(rng: np.random.Generator, worn: bool) -> Made:
 def _make_painted_square(rng: np.random.Generator, worn: bool) -> Made:
     corners_m = _square(float(rng.uniform(2.0, 3.0)))
     colour = _WHITE if rng.uniform() < 0.5 else _YELLOW
-    return corners_m, _PAINT_THICKNESS_M, _prism(corners_m, _PAINT_THICKNESS_M, colour, Surface.PAINT,
-                                                0.06 if worn else 0.0)  # fmt: skip
+    plate = _prism(corners_m, _PAINT_THICKNESS_M, colour, Surface.PAINT, 0.06 if worn else 0.0)
+    return corners_m, _PAINT_THICKNESS_M, plate, _root(corners_m, colour, Surface.PAINT)
 
 
 def _make_board(rng: np.random.Generator, worn: bool) -> Made:
@@ -179,7 +187,7 @@ def _make_board(rng: np.random.Generator, worn: bool) -> Made:
         tones = rng.uniform(0.9, 1.0, int(chosen.sum())) if worn else np.ones(int(chosen.sum()))
         painted.append(toned(mesh, np.repeat(tones, 4)))
     under = box((BOARD_M, BOARD_M, _ROOT_M), _BLACK, Surface.PAINT).at(0.0, 0.0, _BOARD_THICKNESS_M - 0.004 - _ROOT_M)
-    return corners_m, _BOARD_THICKNESS_M, join([*painted, under])
+    return corners_m, _BOARD_THICKNESS_M, join(painted), under
 
 
 _MAKERS: Mapping[str, Callable[[np.random.Generator, bool], Made]] = MappingProxyType({

@@ -16,6 +16,9 @@ from standoff.core.homography import FloatArray
 from standoff.core.pose import View
 from standoff.simulation.mesh import Colour, Float32Array, Mesh
 
+PARKED = 0xFFFE
+"""The entity id, among the props of a site that is not finished, of vehicles that the site will number."""
+
 NOTHING = 0
 """The entity id of everything that the truth does not name."""
 
@@ -194,7 +197,8 @@ class Reference:
     Attributes:
         top_m: (4, 3) upper corners, site frame, counter-clockwise from above.
         base_m: (4, 3) the same corners where the sides meet the ground; equal to `top_m` for a flat one.
-        batches: Its look, entity id set.
+        batches: Its look above the ground, entity id set.
+        roots: What of it is below the ground.
         covers: Sand, plates, ... on it.
         entity_id: Of the truth.
     """
@@ -202,6 +206,7 @@ class Reference:
     top_m: FloatArray
     base_m: FloatArray
     batches: tuple[Batch, ...]
+    roots: tuple[Batch, ...]
     covers: tuple[Cover, ...]
     entity_id: int
 
@@ -222,8 +227,9 @@ class Scene:
         name: Preset.
         seed: Of everything random in it.
         ground: Relief and soils.
-        props: Everything that stands still and is not named in the truth.
+        props: Everything that stands still.
         actors: Workers and machines.
+        parked: Vehicles among the props, each a batch of its own with its entity id.
         reference: Or None.
         light: Sun and sky.
         flight: Camera.
@@ -234,6 +240,7 @@ class Scene:
     ground: Ground
     props: tuple[Batch, ...]
     actors: tuple[Actor, ...]
+    parked: tuple[Batch, ...]
     reference: Reference | None
     light: Light
     flight: Flight

@@ -21,7 +21,7 @@ from standoff.simulation.props.heaps import scatter_litter
 from standoff.simulation.props.plant import PLANT
 from standoff.simulation.reference import board_corners_m, make_reference
 from standoff.simulation.render import Look
-from standoff.simulation.scene import Batch, Flight, Ground, Light, Reference, Scene
+from standoff.simulation.scene import PARKED, Batch, Flight, Ground, Light, Reference, Scene
 from standoff.simulation.sensor import Sensor
 from standoff.simulation.site_plans import SiteStyle, random_plan
 from standoff.simulation.surroundings import make_surroundings
@@ -36,6 +36,7 @@ _FENCE_IN_M = 3.0
 _PROPS_WITHIN_M = 45.0
 _REFERENCE_ID = 1000
 """Of the reference object, far from the actors'."""
+_FIRST_PARKED_ID = 2000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,9 +92,10 @@ def build_site(plan: Plan) -> Site:
     props = _furnish(rng["props"], preset, cast, bed, _furnished(plan, flight), ground)
     props += _fence_in(rng["props"], ground)
     shade = light.to_sun if rng["surroundings"].random() < 0.35 else None
-    props += make_surroundings(rng["surroundings"], ground, shade_to_sun=shade)
+    outside, parked = _number_parked(make_surroundings(rng["surroundings"], ground, shade_to_sun=shade))
+    props += outside + parked
     return Site(
-        Scene(plan.name, plan.seed, ground, props, tuple(cast.actors), reference, light, flight),
+        Scene(plan.name, plan.seed, ground, props, tuple(cast.actors), parked, reference, light, flight),
         camera,
         _develop(rng["look"], light),
         Sensor.draw(rng["look"], preset.condition),
@@ -171,6 +173,18 @@ def _fence_in(rng: np.random.Generator, ground: Ground) -> tuple[Batch, ...]:
     half_m = _EXTENT_M / 2 - _FENCE_IN_M
     corners = np.array([[-half_m, -half_m], [half_m, -half_m], [half_m, half_m], [-half_m, half_m], [-half_m, -half_m]])
     return make_fence(rng, corners, ground.height_at)
+
+
+def _number_parked(batches: tuple[Batch, ...]) -> tuple[tuple[Batch, ...], tuple[Batch, ...]]:
+    """Divide into what the truth does not name, and parked vehicles, one by one with their entity ids."""
+    cars = [
+        replace(batch, poses=batch.poses[k : k + 1], tint=batch.tint[k : k + 1], dust=batch.dust[k : k + 1])
+        for batch in batches
+        if batch.entity_id == PARKED
+        for k in range(len(batch.poses))
+    ]
+    numbered = tuple(replace(car, entity_id=_FIRST_PARKED_ID + k) for k, car in enumerate(cars))
+    return tuple(batch for batch in batches if batch.entity_id != PARKED), numbered
 
 
 def _develop(rng: np.random.Generator, light: Light) -> Look:

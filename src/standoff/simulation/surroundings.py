@@ -15,7 +15,7 @@ from standoff.core.homography import FloatArray
 from standoff.simulation.buildings import COTTAGES, FLATS, SHEDS, WALLS, House, building, scaffolding
 from standoff.simulation.mesh import Colour, Mesh, Surface, rotation, scaling, srgb, translation
 from standoff.simulation.outskirts import CAR_VARIANTS, STREET_VARIANTS, lay_land, lay_street, parked_car
-from standoff.simulation.scene import Batch, place
+from standoff.simulation.scene import NOTHING, PARKED, Batch, place
 from standoff.simulation.terrain import Terrain
 from standoff.simulation.vegetation import (
     BUSH_VARIANTS,
@@ -52,6 +52,7 @@ class _Town:
     taken: list[shapely.Geometry] = field(default_factory=list)
     poses: dict[Mesh, list[FloatArray]] = field(default_factory=dict)
     tints: dict[Mesh, list[FloatArray]] = field(default_factory=dict)
+    ids: dict[Mesh, int] = field(default_factory=dict)
 
     def put(self, mesh: Mesh, at_m: FloatArray, turn_deg: float, stretch: FloatArray, tint: FloatArray) -> None:
         """Stand a mesh on the ground."""
@@ -70,7 +71,9 @@ class _Town:
     def batches(self) -> tuple[Batch, ...]:
         """Return everything placed, one batch for each mesh."""
         return tuple(
-            place(mesh, np.stack(poses), tint=np.stack(self.tints[mesh]), dust=0.25)
+            place(
+                mesh, np.stack(poses), tint=np.stack(self.tints[mesh]), dust=0.25, entity_id=self.ids.get(mesh, NOTHING)
+            )
             for mesh, poses in self.poses.items()
         )
 
@@ -148,7 +151,7 @@ def make_surroundings(
         shade_to_sun: (3,) direction to the sun, if a tall building shall throw part of the site into shade.
 
     Returns:
-        Batches without entity ids, under 120 000 triangles in all.
+        Batches without entity ids but for cars (`PARKED`), under 120 000 triangles in all.
     """
     settings = list(Setting)
     setting = setting or settings[int(rng.choice(len(settings), p=[0.35, 0.25, 0.2, 0.2]))]
@@ -221,7 +224,9 @@ def _line_street(town: _Town, side: _Side, away_m: float, blocked: npt.NDArray[n
                 paint = np.array(_CARS[int(rng.integers(len(_CARS)))])
                 at_m = side.at(float(along_m + rng.uniform(-0.4, 0.4)), away_m + lane_m + float(rng.normal(0.0, 0.08)))
                 turn_deg = side.turn_deg + (180.0 if lane_m > 0 else 0.0) + float(rng.normal(0.0, 1.0))
-                town.put(parked_car(int(rng.integers(CAR_VARIANTS))), at_m, turn_deg, np.ones(3), paint)
+                car = parked_car(int(rng.integers(CAR_VARIANTS)))
+                town.put(car, at_m, turn_deg, np.ones(3), paint)
+                town.ids[car] = PARKED
     if rng.random() < 0.6:
         for along_m in np.arange(-130.0, 130.0, rng.uniform(9.0, 16.0)):
             if rng.random() < 0.75:

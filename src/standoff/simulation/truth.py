@@ -113,7 +113,7 @@ def visible_boxes_px(ids: IdArray, count: int) -> tuple[FloatArray, npt.NDArray[
 
 
 def entity_rows(frame: int, moment: Moment, ids: IdArray, silhouette_px: Callable[[Body], int]) -> list[Row]:
-    """Return the rows of `TRUTH_SCHEMA` for one frame.
+    """Return the rows of `TRUTH_SCHEMA` for one frame: every body, and the parked vehicles that show.
 
     Args:
         frame: Its index.
@@ -121,10 +121,12 @@ def entity_rows(frame: int, moment: Moment, ids: IdArray, silhouette_px: Callabl
         ids: (H, W) id picture.
         silhouette_px: Counts the pixels that a body alone would cover.
     """
-    boxes, sizes = visible_boxes_px(ids, max((body.entity_id for body in moment.bodies), default=0))
+    everybody = (*moment.bodies, *moment.parked)
+    boxes, sizes = visible_boxes_px(ids, max((body.entity_id for body in everybody), default=0))
+    shown = (*moment.bodies, *(body for body in moment.parked if sizes[body.entity_id]))
     return [
         _entity_row(frame, moment, body, boxes[body.entity_id], int(sizes[body.entity_id]), silhouette_px)
-        for body in moment.bodies
+        for body in shown
     ]
 
 
@@ -152,7 +154,10 @@ def _entity_row(
 
 
 def pair_rows(frame: int, moment: Moment) -> list[Row]:
-    """Return the rows of `PAIRS_SCHEMA` for one frame: every kind of distance between two entities, horizontal."""
+    """Return the rows of `PAIRS_SCHEMA` for one frame: every kind of distance between two entities, horizontal.
+
+    The reference object and vehicles parked in the street keep no distance.
+    """
     bodies = [body for body in moment.bodies if CLASSES[body.class_id].role is not Role.REFERENCE]
     outlines = {body.entity_id: shapely.Polygon(body.footprint_m) for body in bodies}
     return [

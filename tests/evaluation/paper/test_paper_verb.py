@@ -105,7 +105,7 @@ def test_the_lab_test_on_a_drawn_board(board_folder: Path) -> None:
     board, figures = clip["board"], figures_of(clip)
     assert board["frames"] == drawn_board.FRAMES and board["measured"] == drawn_board.FRAMES - 1
     assert board["before"][drawn_board.EMPTY] is None
-    assert board["corner_rmse_px"] < 0.3
+    assert board["corner_rmse_px"] < 0.3 and board["misplaced"] == 0
     assert board["exact_after_percent"] == pytest.approx(100.0)
     assert 95.0 < board["after_percent"] < 100.0
     assert board["after_percent"] < board["after_pose_percent"] <= 100.0

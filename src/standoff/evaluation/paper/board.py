@@ -12,6 +12,7 @@ from standoff.core.homography import FloatArray
 from standoff.evaluation.checkerboard import CheckerboardResult, evaluate_views
 from standoff.evaluation.paper.clip import Clip, TrueBoard
 from standoff.evaluation.paper.watch import check_frame, open_clip_video
+from standoff.evaluation.rectification import FAILURE_PX
 from standoff.stages.ground import BoardView, find_corners, load_camera
 
 NOT_FOUND = "no whole board found"
@@ -34,6 +35,7 @@ class BoardScore:
         worst_frame: With the lowest accuracy before; -1 without.
         best_frame: With the highest accuracy before; -1 without.
         corner_rmse_px: Of the found corners; NaN without.
+        misplaced: Frames in which a found corner is more than 5 px off.
     """
 
     frames: int
@@ -48,6 +50,7 @@ class BoardScore:
     worst_frame: int
     best_frame: int
     corner_rmse_px: float
+    misplaced: int
 
 
 def watch_board(clip: Clip, board: TrueBoard, on_frame: Callable[[], None] | None = None) -> list[BoardView]:
@@ -62,7 +65,8 @@ def watch_board(clip: Clip, board: TrueBoard, on_frame: Callable[[], None] | Non
         for frame in source:
             check_frame(clip, frame.index)
             corners_px = find_corners(frame.picture.gray(), (board.side, board.side))
-            views.append(BoardView(_name(frame.index), source.size_px, corners_px))
+            in_order_px = as_in_truth(corners_px, board.corners_px[frame.index]) if corners_px.size else corners_px
+            views.append(BoardView(_name(frame.index), source.size_px, in_order_px))
             if on_frame is not None:
                 on_frame()
     check_frame(clip, clip.frame_count - 1, seen=len(views))
@@ -84,7 +88,7 @@ def score_board(clip: Clip, board: TrueBoard, views: list[BoardView]) -> BoardSc
     for view in found.views if found else ():
         index = int(view.name.split()[-1])
         before[index], after[index] = view.before_percent, view.after_percent
-    none = float("nan")
+    none, error_px = float("nan"), _corner_errors_px(views, board)
     return BoardScore(
         frames=frames,
         measured=int(np.isfinite(after).sum()),
@@ -97,8 +101,28 @@ def score_board(clip: Clip, board: TrueBoard, views: list[BoardView]) -> BoardSc
         exact_after_percent=of_truth.after_percent if of_truth else none,
         worst_frame=int(np.nanargmin(before)) if found else -1,
         best_frame=int(np.nanargmax(before)) if found else -1,
-        corner_rmse_px=_corner_rmse_px(views, board),
+        corner_rmse_px=float(np.sqrt(np.mean(error_px**2))) if error_px.size else none,
+        misplaced=int((error_px > FAILURE_PX).any(axis=1).sum()),
     )
+
+
+def as_in_truth(corners_px: FloatArray, true_px: FloatArray) -> FloatArray:
+    """Turn a grid of corners so that it runs as the true one does.
+
+    A finder begins where it likes. The figures before rectification depend on which side of the first square gives
+    the scale, and on a board as long as wide nothing else tells the sides apart.
+
+    Args:
+        corners_px: (side, side, 2) as found.
+        true_px: (side, side, 2).
+
+    >>> true_px = np.array([[[0.0, 0.0], [5.0, 0.0]], [[0.0, 9.0], [5.0, 9.0]]])
+    >>> bool((as_in_truth(true_px.transpose(1, 0, 2)[::-1], true_px) == true_px).all())
+    True
+    """
+    sides = (corners_px, corners_px.transpose(1, 0, 2))
+    ways = [way for side in sides for way in (side, side[::-1], side[:, ::-1], side[::-1, ::-1])]
+    return min(ways, key=lambda way: float(np.nansum((way - true_px) ** 2)))
 
 
 def _name(index: int) -> str:
@@ -111,11 +135,8 @@ def _result(views: list[BoardView], board: TrueBoard, camera: Camera | None = No
     return evaluate_views(views, (board.side, board.side), board.square_m, camera)
 
 
-def _corner_rmse_px(views: list[BoardView], board: TrueBoard) -> float:
-    """Return the error of the found corners, each compared with the true one nearest to it."""
-    errors = [
-        np.linalg.norm(view.corners_px.reshape(-1, 1, 2) - true_px.reshape(1, -1, 2), axis=2).min(axis=1)
-        for view, true_px in zip(views, board.corners_px, strict=True)
-        if view.found
-    ]
-    return float(np.sqrt(np.mean(np.concatenate(errors) ** 2))) if errors else float("nan")
+def _corner_errors_px(views: list[BoardView], board: TrueBoard) -> FloatArray:
+    """Return (V, side * side) of the views in which a board was found."""
+    pairs = zip(views, board.corners_px, strict=True)
+    errors = [np.linalg.norm(view.corners_px - true_px, axis=2).ravel() for view, true_px in pairs if view.found]
+    return np.array(errors).reshape(len(errors), board.side**2)

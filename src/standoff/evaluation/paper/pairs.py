@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -131,6 +131,9 @@ def group_pairs(series: tuple[PairSeries, ...]) -> tuple[PairGroup, ...]:
             name: score_distances(*(np.concatenate([pairs[name][side] for pairs in compared]) for side in (0, 1)))
             for name in compared[0]
         }
+        if AGAINST_BENCHMARK in scores:
+            # What the benchmark does not cover is missing, too.
+            scores[AGAINST_BENCHMARK] = replace(scores[AGAINST_BENCHMARK], frames=scores[AFTER].frames)
         reasons = np.concatenate([one.reason for one in own])
         missing = dict(Counter(reasons[reasons != ""].tolist()).most_common())
         groups.append(PairGroup(class_pair, len(own), scores, missing))

@@ -1,4 +1,4 @@
-"""Big things that sites have: accommodation, storage, machinery that stands still, barriers, parked vehicles."""
+"""Big things that sites have: accommodation, storage, machinery that stands still and barriers."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from standoff.simulation.props.cabins import make_cabin, make_cabin_block, make_
 from standoff.simulation.props.containers import make_container, make_skip
 from standoff.simulation.props.crane import make_crane
 from standoff.simulation.props.fences import make_barriers, make_gate
-from standoff.simulation.props.parked import make_parked_car, make_parked_row, make_parked_truck
 from standoff.simulation.props.prop import Prop
 from standoff.simulation.props.scaffold import make_scaffold, make_scaffold_tower
 from standoff.simulation.props.site_machines import (
@@ -46,9 +45,6 @@ PLANT: Mapping[str, Prop] = {
         Prop("pump", 1.4, make_pump, 0.6),
         Prop("scaffold_tower", 2.0, make_scaffold_tower, 0.8),
         Prop("scaffold", 7.8, make_scaffold, 0.8),
-        Prop("parked_car", 3.0, make_parked_car, 1.4),
-        Prop("parked_row", 8.6, make_parked_row, 0.6),
-        Prop("parked_truck", 5.4, make_parked_truck, 0.5),
     )
 }
 """Every family by name; `crane` reaches over half the site, but only its foot keeps others away."""

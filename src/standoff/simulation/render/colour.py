@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from standoff.simulation.render.context import build_program, set_uniforms
-from standoff.simulation.render.frustum import Frustum
+from standoff.simulation.render.frustum import FAR_M, NEAR_M, Frustum
 from standoff.simulation.render.geometry import Arena, InstanceDrawer, Instances
 from standoff.simulation.render.noise import make_noise
 from standoff.simulation.render.relief import Relief, upload_with_mipmaps
@@ -16,7 +16,16 @@ from standoff.simulation.render.surfaces import surface_table
 from standoff.simulation.render.targets import OPENNESS_STEP_PX, Targets
 from standoff.simulation.scene import Light
 
-_UNITS = {"shadow_map": 0, "shadow_depth": 1, "openness": 2, "noise": 3, "picture": 4}
+_UNITS = {
+    "shadow_map": 0,
+    "shadow_depth": 1,
+    "openness": 2,
+    "noise": 3,
+    "picture": 4,
+    "slopes": 5,
+    "ground_depth": 6,
+    "ground_radiance": 7,
+}
 
 
 class ColourPass:
@@ -26,9 +35,11 @@ class ColourPass:
         self._context = context
         lit = "light.glsl"
         self._things = InstanceDrawer(context, build_program(context, ("instances.vert",), (lit, "instances.frag")))
-        self._ground = build_program(context, ("ground.vert",), (lit, "ground.frag"))
+        self._ground_depth = build_program(context, ("depth_ground.vert",), ("nothing.frag",))
+        self._ground = context.vertex_array(build_program(context, ("fullscreen.vert",), (lit, "ground.frag")), [])
+        self._ground_copy = build_program(context, ("depth_ground.vert",), ("ground_copy.frag",))
         self._sky = context.vertex_array(build_program(context, ("fullscreen.vert",), (lit, "sky.frag")), [])
-        self._noise = upload_with_mipmaps(context, make_noise())
+        self._noise = upload_with_mipmaps(context, make_noise(), smooth=False)
         set_uniforms(self._things.program, {"surfaces": surface_table()})
 
     def draw(
@@ -36,14 +47,10 @@ class ColourPass:
         sun: dict[str, object],
     ) -> None:  # fmt: skip
         """Fill `targets.colour`; `sun` are the uniforms of `sun_uniforms`."""
-        context = self._context
-        context.enable_only(context.DEPTH_TEST)
-        targets.colour_pass.use()
-        targets.colour_pass.clear(depth=1.0)
-        shadow.use(_UNITS["shadow_map"], _UNITS["shadow_depth"])
-        targets.smooth.use(_UNITS["openness"])
-        self._noise.use(_UNITS["noise"])
-        relief.picture.use(_UNITS["picture"])
+        units = {
+            "openness": targets.smooth, "noise": self._noise, "picture": relief.picture, "slopes": relief.slopes,
+            "ground_depth": targets.ground_depth, "ground_radiance": targets.ground,
+        }  # fmt: skip
         pixel_to_ray = np.linalg.inv(frustum.view.camera.matrix @ frustum.view.site_to_camera)
         values = {
             **sun,
@@ -53,16 +60,40 @@ class ColourPass:
             "origin": tuple(frustum.view.position_m.tolist()),
             "offset_from_pixel": pixel_to_ray @ frustum.undistorted_from_drawn(),
             "openness_scale": tuple(1.0 / (OPENNESS_STEP_PX * length) for length in targets.small_px),
+            "depth_range": (NEAR_M, FAR_M),
         }
-        for program in (self._things.program, self._ground, self._sky.program):
+        sky, ground, copy = self._sky.program, self._ground.program, self._ground_copy
+        for program in (self._things.program, sky, ground, copy, self._ground_depth):
             set_uniforms(program, values)
+        shadow.use(_UNITS["shadow_map"], _UNITS["shadow_depth"])
+        for name, texture in units.items():
+            texture.use(_UNITS[name])
+        self._light_ground(targets, frustum, relief)
+        self._draw_samples(targets, frustum, visible, arena, relief)
+        shadow.unuse(_UNITS["shadow_map"], _UNITS["shadow_depth"])
+        self._context.copy_framebuffer(targets.resolved, targets.colour_pass)
+
+    def _light_ground(self, targets: Targets, frustum: Frustum, relief: Relief) -> None:
+        self._context.enable_only(self._context.DEPTH_TEST)
+        targets.ground_depth_pass.use()
+        targets.ground_depth_pass.clear(depth=1.0)
+        relief.draw(self._ground_depth, frustum)
+        self._context.enable_only(self._context.NOTHING)
+        targets.ground_pass.use()
+        self._ground.render(vertices=3)
+
+    def _draw_samples(
+        self, targets: Targets, frustum: Frustum, visible: Instances, arena: Arena, relief: Relief
+    ) -> None:
+        context = self._context
+        context.enable_only(context.DEPTH_TEST)
+        targets.colour_pass.use()
+        targets.colour_pass.clear(depth=1.0)
         self._things.draw(visible, arena)
-        relief.draw(self._ground, frustum)
+        relief.draw(self._ground_copy, frustum)
         context.depth_func = "<="
         self._sky.render(vertices=3)
         context.depth_func = "<"
-        shadow.unuse(_UNITS["shadow_map"], _UNITS["shadow_depth"])
-        context.copy_framebuffer(targets.resolved, targets.colour_pass)
 
 
 def sun_uniforms(light: Light, box: SunBox, shadow: ShadowMap, frustum: Frustum) -> dict[str, object]:

@@ -26,20 +26,23 @@ class Culler(Protocol):
 
 
 def grid_vertices(ground: Ground) -> Float32Array:
-    """Return (ny + 2, nx + 2, 6) positions and normals; the outer ring lies far outside at the border's height."""
+    """Return (ny + 2, nx + 2, 3) positions; the outer ring lies far outside at the border's height."""
     rows, columns = ground.height_m.shape
     x = ground.origin_xy_m[0] + ground.cell_m * np.arange(columns)
     y = ground.origin_xy_m[1] + ground.cell_m * np.arange(rows)
     x = np.concatenate([[x[0] - _BEYOND_M], x, [x[-1] + _BEYOND_M]])
     y = np.concatenate([[y[0] - _BEYOND_M], y, [y[-1] + _BEYOND_M]])
-    slope_y, slope_x = np.gradient(ground.height_m, ground.cell_m)
-    normals = np.stack([-slope_x, -slope_y, np.ones_like(slope_x)], axis=-1)
-    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
-    table = np.empty((rows + 2, columns + 2, 6), np.float32)
+    table = np.empty((rows + 2, columns + 2, 3), np.float32)
     table[..., 0], table[..., 1] = np.meshgrid(x, y)
     table[..., 2] = np.pad(ground.height_m, 1, mode="edge")
-    table[..., 3:] = np.pad(normals, ((1, 1), (1, 1), (0, 0)), mode="edge")
     return table
+
+
+def slope_picture(ground: Ground) -> npt.NDArray[np.float16]:
+    """Return (ny, nx, 2) slopes towards east and north at the height samples."""
+    north, east = np.gradient(ground.height_m, ground.cell_m)
+    slopes: npt.NDArray[np.float16] = np.stack([east, north], axis=-1).astype(np.float16)
+    return slopes
 
 
 def grid_triangles(rows: int, columns: int) -> tuple[npt.NDArray[np.uint32], npt.NDArray[np.int64]]:
@@ -72,8 +75,14 @@ def encoded_picture(ground: Ground) -> npt.NDArray[np.uint8]:
     return picture
 
 
-def upload_with_mipmaps(context: Any, picture: npt.NDArray[np.uint8]) -> Any:  # noqa: ANN401
-    """Return a mipmapped texture; the levels are averaged here, which is quicker than in the driver."""
+def upload_with_mipmaps(context: Any, picture: npt.NDArray[np.uint8], *, smooth: bool = True) -> Any:  # noqa: ANN401
+    """Return a mipmapped texture; the levels are averaged here, which is quicker than in the driver.
+
+    Args:
+        context: OpenGL context.
+        picture: (H, W, 4).
+        smooth: Blend two levels, at twice the cost.
+    """
     texture = context.texture((picture.shape[1], picture.shape[0]), 4, alignment=1)
     texture.build_mipmaps()
     level = 0
@@ -84,7 +93,7 @@ def upload_with_mipmaps(context: Any, picture: npt.NDArray[np.uint8]) -> Any:  #
         smaller = max(picture.shape[1] // 2, 1), max(picture.shape[0] // 2, 1)
         picture = cv2.resize(picture, smaller, interpolation=cv2.INTER_AREA)
         level += 1
-    texture.filter = (context.LINEAR_MIPMAP_LINEAR, context.LINEAR)
+    texture.filter = (context.LINEAR_MIPMAP_LINEAR if smooth else context.LINEAR_MIPMAP_NEAREST, context.LINEAR)
     return texture
 
 
@@ -98,7 +107,7 @@ class Relief:
         self._commands[:, 0] = 6 * np.diff(starts, append=len(corners))
         self._commands[:, 1] = 1
         self._commands[:, 2] = 6 * starts
-        cell_points = vertices.reshape(-1, 6)[corners[:, [0, 2, 1, 5]], :3]
+        cell_points = vertices.reshape(-1, 3)[corners[:, [0, 2, 1, 5]]]
         low = np.minimum.reduceat(cell_points.min(axis=1), starts)
         high = np.maximum.reduceat(cell_points.max(axis=1), starts)
         self._centre_m = ((low + high) / 2).astype(np.float32)
@@ -109,9 +118,13 @@ class Relief:
         self._indirect = context.buffer(reserve=self._commands.nbytes)
         self.picture = upload_with_mipmaps(context, encoded_picture(ground))
         samples = np.array(ground.height_m.shape[::-1])
+        size_px = (int(samples[0]), int(samples[1]))
+        self.slopes = context.texture(size_px, 2, slope_picture(ground).tobytes(), dtype="f2", alignment=1)
+        self.slopes.repeat_x = self.slopes.repeat_y = False
         extent_m = (samples - 1) * ground.cell_m
         self.uniforms = {
             "extent": (*np.asarray(ground.origin_xy_m, dtype=float).tolist(), *extent_m.tolist()),
+            "samples": tuple(samples.tolist()),
             "dust_colour": tuple(self._dust_colour(ground).tolist()),
         }
         self._arrays: dict[int, Any] = {}
@@ -130,12 +143,20 @@ class Relief:
         if not len(chosen):
             return
         if program.glo not in self._arrays:
-            layout = ("3f 3f", "position", "normal") if "normal" in program else ("3f 12x", "position")
-            self._arrays[program.glo] = self._context.vertex_array(program, [(self.vertices, *layout)], self.indices)
+            self._arrays[program.glo] = self._context.vertex_array(
+                program, [(self.vertices, "3f", "position")], self.indices
+            )
         self._indirect.write(np.ascontiguousarray(chosen).data)
         self._arrays[program.glo].render_indirect(self._indirect, count=len(chosen))
 
     def release(self) -> None:
         """Free the GPU memory."""
-        for resource in (*self._arrays.values(), self.vertices, self.indices, self._indirect, self.picture):
+        for resource in (
+            *self._arrays.values(),
+            self.vertices,
+            self.indices,
+            self._indirect,
+            self.picture,
+            self.slopes,
+        ):
             resource.release()

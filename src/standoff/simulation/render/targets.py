@@ -24,6 +24,13 @@ class Targets:
         self.depth.compare_func = ""
         self.depth.filter = (context.NEAREST, context.NEAREST)
         self.id_pass = context.framebuffer([self.ids], self.depth)
+        self.ground_depth = context.depth_texture(size_px)
+        self.ground_depth.compare_func = ""
+        self.ground_depth.filter = (context.NEAREST, context.NEAREST)
+        self.ground_depth_pass = context.framebuffer(depth_attachment=self.ground_depth)
+        self.ground = context.texture(size_px, 4, dtype="f2")
+        self.ground.filter = (context.NEAREST, context.NEAREST)
+        self.ground_pass = context.framebuffer([self.ground])
         self.small_px = tuple(-(-length // OPENNESS_STEP_PX) for length in size_px)
         self.rough, self.smooth = (context.texture(self.small_px, 1, dtype="f1") for _ in range(2))
         for texture in (self.rough, self.smooth):
@@ -40,6 +47,6 @@ class Targets:
         """Free the GPU memory."""
         for resource in (
             self.id_pass, self.rough_pass, self.smooth_pass, self.colour_pass, self.resolved, self.ids, self.depth,
-            self.rough, self.smooth, self._sampled, self._sampled_depth, self.colour,
+            self.ground_depth_pass, self.ground_depth, self.ground_pass, self.ground, self.rough, self.smooth, self._sampled, self._sampled_depth, self.colour,
         ):  # fmt: skip
             resource.release()

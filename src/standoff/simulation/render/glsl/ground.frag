@@ -1,13 +1,21 @@
-in vec3 v_offset, v_normal;
-in vec2 v_xy;
-uniform sampler2D picture, noise;
+// The ground's radiance at every pixel, whatever stands before it, from the depth of the ground alone. The colour pass
+// then only copies it: lighting the ground's many small triangles one by one would cost several times as much.
+uniform sampler2D picture, noise, ground_depth, slopes;
 uniform vec4 extent;  // south-west corner and size of the grid
+uniform vec2 samples; // of height, in x and y
+uniform vec3 origin;
+uniform vec2 depth_range;  // near, far
+uniform mat3 offset_from_pixel;
 out vec4 radiance;
 
 void main() {
-    float away = length(v_offset);
-    vec3 to_eye = -v_offset / away;
-    vec2 place = (v_xy - extent.xy) / extent.zw;
+    float z = texelFetch(ground_depth, ivec2(gl_FragCoord.xy), 0).r * 2.0 - 1.0;
+    float forward = 2.0 * depth_range.x * depth_range.y / (depth_range.y + depth_range.x - z * (depth_range.y - depth_range.x));
+    vec3 offset = offset_from_pixel * vec3(gl_FragCoord.xy - 0.5, 1.0) * forward;
+    vec2 xy = origin.xy + offset.xy;
+    float away = length(offset);
+    vec3 to_eye = -offset / away;
+    vec2 place = (xy - extent.xy) / extent.zw;
     // Outside the grid the picture goes on mirrored, and fades to its own mean.
     vec2 folded = 1.0 - abs(fract(0.5 * place) * 2.0 - 1.0);
     vec2 outside = max(abs(place - 0.5) - 0.5, 0.0) * extent.zw;
@@ -15,20 +23,22 @@ void main() {
     vec4 base = texture(picture, folded, 6.0 * far);
     vec3 albedo = base.rgb * base.rgb;
     float wet = base.a * (1.0 - far);
-    vec4 fine = texture(noise, v_xy * 0.29);
-    vec4 broad = texture(noise, mat2(0.81, 0.59, -0.59, 0.81) * v_xy * 0.043);
+    vec4 fine = texture(noise, xy * 0.29);
+    vec4 broad = texture(noise, mat2(0.81, 0.59, -0.59, 0.81) * xy * 0.043);
     float puddle = smoothstep(0.72, 0.9, wet + 0.15 * (broad.r - 0.5));
     float rough = 1.0 - puddle;
     albedo *= 1.0 + rough * (1.1 * (fine.r - 0.5) + 0.55 * (broad.r - 0.5));
     float stone = fine.g * smoothstep(0.35, 0.75, broad.g + broad.r);
     albedo = mix(albedo, mix(albedo, vec3(dot(albedo, vec3(0.3, 0.5, 0.2))), 0.6) * (0.9 + 0.9 * fine.r), 0.55 * stone * rough);
     albedo *= mix(1.0, 0.42, smoothstep(0.05, 0.7, wet));
-    vec3 normal = normalize(v_normal);
+    vec2 slope = texture(slopes, (clamp(place, 0.0, 1.0) * (samples - 1.0) + 0.5) / samples).rg;
+    vec3 level = normalize(vec3(-slope, 1.0));
+    vec3 normal = level;
     normal = normalize(normal - rough * vec3(1.5 * (fine.ba - 0.5), 0.0));
     normal = normalize(mix(normal, vec3(0.0, 0.0, 1.0), puddle));
     float roughness = mix(mix(0.95, 0.45, smoothstep(0.2, 0.8, wet)), 0.07, puddle);
     float open = texture(openness, gl_FragCoord.xy * openness_scale).r;
-    float lit = dot(normal, to_sun) > 0.0 ? sunlit(v_offset, normalize(v_normal), true) : 0.0;
+    float lit = dot(normal, to_sun) > 0.0 ? sunlit(offset, level, true) : 0.0;
     vec3 light = shade(clamp(albedo, 0.0, 0.9), normal, to_eye, roughness, 0.0, lit, open);
     radiance = vec4(min(hazy(light, away), vec3(30.0)), 1.0);
 }

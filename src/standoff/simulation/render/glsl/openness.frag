@@ -5,11 +5,12 @@ uniform vec4 depth_range;        // near, far, step in full-size pixels, focal l
 out float open;
 
 float forward(vec2 pixel) {
-    float z = texelFetch(depth, ivec2(clamp(pixel, vec2(0.0), vec2(textureSize(depth, 0) - 1))), 0).r * 2.0 - 1.0;
+    float z = texelFetch(depth, ivec2(pixel), 0).r * 2.0 - 1.0;
     return 2.0 * depth_range.x * depth_range.y / (depth_range.y + depth_range.x - z * (depth_range.y - depth_range.x));
 }
 
 vec3 point(vec2 pixel) {
+    pixel = clamp(pixel, vec2(0.0), vec2(textureSize(depth, 0) - 1));
     return camera_from_pixel * vec3(pixel, 1.0) * forward(pixel);
 }
 
@@ -33,5 +34,5 @@ void main() {
         float squared = dot(toward, toward);
         hidden += max(dot(toward, normal) - 0.015 - 0.0007 * centre.z, 0.0) * inversesqrt(squared + 0.001) / (1.0 + 0.25 * squared);
     }
-    open = max(exp(-3.4 * hidden / float(TAPS)), 0.1);
+    open = max(exp(-4.5 * hidden / float(TAPS)), 0.1);
 }
