@@ -8,13 +8,15 @@ import numpy as np
 import numpy.typing as npt
 
 from standoff.core.camera import Camera
+from standoff.core.homography import FloatArray, apply
 from standoff.simulation.render.context import build_program, set_uniforms
 from standoff.simulation.render.frustum import Frustum
 from standoff.simulation.render.lens import LensMap
 from standoff.simulation.render.look import Look
 from standoff.simulation.render.targets import Targets
 
-_BLUR_TAPS = 7
+_MOST_TAPS = 9
+_SHARP_PX = 0.25
 
 
 class Development:
@@ -56,7 +58,7 @@ class Development:
             "undistorted": 2,
             "drawn_texel": tuple(1.0 / length for length in targets.size_px),
             "blur": drawn_from_undistorted @ blur @ frustum.undistorted_from_drawn(),
-            "blur_taps": 1 if look.blur is None else _BLUR_TAPS,
+            "blur_taps": blur_taps(blur, frustum),
             "gain": tuple(gain.tolist()),
             "tone": (look.contrast, look.lift, look.saturation, look.vignette),
             "picture_centre": (width / 2, height / 2),
@@ -69,3 +71,18 @@ class Development:
         colour = np.frombuffer(self._output.read(components=4, alignment=1), np.uint8).reshape(height, width, 4)
         ids = np.frombuffer(self._output.read(components=1, attachment=1, dtype="u2", alignment=1), np.uint16)
         return np.ascontiguousarray(colour[..., :3]), ids.reshape(height, width).copy()
+
+
+def blur_taps(blur: FloatArray, frustum: Frustum) -> int:
+    """Return how many samples along the longest path are less than a pixel and a half apart: 1 to 9.
+
+    Args:
+        blur: As in `Look`.
+        frustum: The drawn picture, whose corners move most.
+    """
+    left, top = frustum.origin_px
+    width, height = frustum.size_px
+    corners = np.array([[left, top], [left + width, top], [left, top + height], [left + width, top + height]], float)
+    moved, valid = apply(blur, corners)
+    path_px = np.linalg.norm(moved - corners, axis=1)[valid].max(initial=0.0)
+    return int(np.clip(np.ceil(path_px / 1.5), 2, _MOST_TAPS)) if path_px > _SHARP_PX else 1

@@ -16,8 +16,8 @@ from standoff.simulation.render.geometry import Arena, InstanceDrawer, Instances
 from standoff.simulation.render.relief import Relief
 from standoff.simulation.scene import Light
 
-_LARGE_PX, _SMALL_PX = 4096, 3072
-_LARGE_PICTURE_PX = 1400
+_SMALLEST_PX, _LARGEST_PX = 2048, 4096
+_TEXELS_PER_PIXEL = 1.6
 _REACH_M = 160.0
 _OBJECTS_M = 9.0
 _MARGIN_M = 1.0
@@ -106,7 +106,7 @@ class ShadowMap:
 
     def __init__(self, context: Any, picture_px: tuple[int, int]) -> None:  # noqa: ANN401
         self._context = context
-        self.size_px = _LARGE_PX if max(picture_px) > _LARGE_PICTURE_PX else _SMALL_PX
+        self.size_px = int(np.clip(_TEXELS_PER_PIXEL * max(picture_px), _SMALLEST_PX, _LARGEST_PX))
         self._depth = context.depth_texture((self.size_px, self.size_px))
         self._target = context.framebuffer(depth_attachment=self._depth)
         self._compared = self._sampler("<=", context.LINEAR)

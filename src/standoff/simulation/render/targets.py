@@ -45,8 +45,8 @@ class Targets:
 
     def release(self) -> None:
         """Free the GPU memory."""
-        for resource in (
-            self.id_pass, self.rough_pass, self.smooth_pass, self.colour_pass, self.resolved, self.ids, self.depth,
-            self.ground_depth_pass, self.ground_depth, self.ground_pass, self.ground, self.rough, self.smooth, self._sampled, self._sampled_depth, self.colour,
-        ):  # fmt: skip
+        passes = (self.id_pass, self.ground_depth_pass, self.ground_pass, self.rough_pass, self.smooth_pass)
+        pictures = (self.ids, self.depth, self.ground_depth, self.ground, self.rough, self.smooth, self.colour)
+        sampled = (self.colour_pass, self.resolved, self._sampled, self._sampled_depth)
+        for resource in (*passes, *sampled, *pictures):
             resource.release()
