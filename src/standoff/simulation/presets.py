@@ -54,6 +54,7 @@ class Preset:
         shape: Of the reference object, a kind of `standoff.simulation.reference`; None for none.
         covers: What lies on it.
         style: Of the site, one of `standoff.simulation.site_plans.SiteStyle`.
+        soil: Of the open ground, one of `standoff.simulation.terrain_plan.Soil`; None draws one.
         condition: Of the light; see `standoff.simulation.light.random_light`.
         clutter: Density of props, 1 is a busy site.
         furnished_m: Props stand within this distance of the middle; None: where the camera looks.
@@ -73,6 +74,7 @@ class Preset:
     shape: str | None = "square_footing"
     covers: tuple[CoverPlan, ...] = ()
     style: str = "earthworks"
+    soil: str | None = None
     condition: Condition = "afternoon"
     clutter: float = 1.0
     furnished_m: float | None = None
@@ -83,22 +85,22 @@ PRESETS: Mapping[str, Preset] = MappingProxyType(
     {
         "mobile": Preset(
             "The paper's mobile test: worker, loader and excavator about a 2.89 m footing, sand on it for a while.",
-            "mobile", width_px=3840, height_px=2140, frames=398,
+            "mobile", width_px=3840, height_px=2140, frames=398, soil="brown earth", condition="overcast",
             covers=(CoverPlan("sand_corner", 0.42, 0.53),),
         ),
         "stationary-15": Preset(
             "The paper's stationary test: worker and excavator exactly 15 m apart, quadrilateral footing, hand-held.",
             "stationary-15", frames=50, motion="hand", shape="quadrilateral_footing", style="foundations",
-            condition="noon",
+            soil="brown earth", condition="hazy",
         ),
         "stationary-20": Preset(
             "The same, exactly 20 m apart.",
             "stationary-20", frames=50, motion="hand", shape="quadrilateral_footing", style="foundations",
-            condition="overcast", altitude_m=27.0,
+            soil="red clay", condition="overcast", altitude_m=27.0,
         ),
         "virtual": Preset(
             "The paper's virtual test (8.2): nothing on the reference object and little around it.",
-            "mobile", frames=120, clutter=0.15, condition="noon",
+            "mobile", frames=120, clutter=0.15, soil="brown earth", condition="overcast",
         ),
         "board": Preset(
             "The paper's lab test at full size: a checkerboard of 25 m under a drone.",

@@ -32,7 +32,7 @@ _ROOT_M = 0.5
 _WHITE = srgb("#d9d6cd")
 _YELLOW = srgb("#d8a51c")
 _BLACK = srgb("#232323")
-_CONCRETES = tuple(srgb(code) for code in ("#b9b5ab", "#c4bfb2", "#aaa8a2", "#cbc8bf"))
+_CONCRETES = tuple(srgb(code) for code in ("#d2cec4", "#dad6cb", "#c6c3bb", "#d8d6cf"))
 
 
 def make_reference(

@@ -26,7 +26,7 @@ from standoff.simulation.sensor import Sensor
 from standoff.simulation.site_plans import SiteStyle, random_plan
 from standoff.simulation.surroundings import make_surroundings
 from standoff.simulation.terrain import Terrain, make_terrain
-from standoff.simulation.terrain_plan import FlatPatch
+from standoff.simulation.terrain_plan import FlatPatch, Soil
 
 _EXTENT_M = 130.0
 _REFERENCE_CLEAR_M = 3.2
@@ -115,7 +115,10 @@ def _shape_ground(rng: np.random.Generator, preset: Preset, cast: Cast, referenc
         radius_m = float(np.clip(shapely.minimum_bounding_radius(way), 1.5, 14.0))
         patches.append(FlatPatch(_pair(centre_m), radius_m, firmness=0.5))
     extent_m = (_EXTENT_M, _EXTENT_M)
-    return make_terrain(rng, random_plan(rng, SiteStyle(preset.style), patches=patches, extent_m=extent_m))
+    plan = random_plan(rng, SiteStyle(preset.style), patches=patches, extent_m=extent_m)
+    if preset.soil is not None:
+        plan = replace(plan, soil=Soil(preset.soil))
+    return make_terrain(rng, plan)
 
 
 def _pair(xy_m: FloatArray) -> tuple[float, float]:

@@ -25,7 +25,7 @@ class Finish:
         along_per_m: Tiles of grain per metre along the surface.
         across_per_m: Across it; another number than along gives fibres or streaks.
         stain_per_m: Tiles of stains per metre.
-        glow: Light sent back towards the sun's side by tape.
+        glow: Share of light that tape sends back to where it came from.
     """
 
     roughness: float

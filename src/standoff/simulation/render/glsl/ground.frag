@@ -10,7 +10,8 @@ out vec4 radiance;
 
 void main() {
     float z = texelFetch(ground_depth, ivec2(gl_FragCoord.xy), 0).r * 2.0 - 1.0;
-    float forward = 2.0 * depth_range.x * depth_range.y / (depth_range.y + depth_range.x - z * (depth_range.y - depth_range.x));
+    float near = depth_range.x, end = depth_range.y;
+    float forward = 2.0 * near * end / (end + near - z * (end - near));
     vec3 offset = offset_from_pixel * vec3(gl_FragCoord.xy - 0.5, 1.0) * forward;
     vec2 xy = origin.xy + offset.xy;
     float away = length(offset);
@@ -29,7 +30,8 @@ void main() {
     float rough = 1.0 - puddle;
     albedo *= 1.0 + rough * (1.1 * (fine.r - 0.5) + 0.55 * (broad.r - 0.5));
     float stone = fine.g * smoothstep(0.35, 0.75, broad.g + broad.r);
-    albedo = mix(albedo, mix(albedo, vec3(dot(albedo, vec3(0.3, 0.5, 0.2))), 0.6) * (0.9 + 0.9 * fine.r), 0.55 * stone * rough);
+    vec3 stony = mix(albedo, vec3(dot(albedo, vec3(0.3, 0.5, 0.2))), 0.6) * (0.9 + 0.9 * fine.r);
+    albedo = mix(albedo, stony, 0.55 * stone * rough);
     albedo *= mix(1.0, 0.42, smoothstep(0.05, 0.7, wet));
     vec2 slope = texture(slopes, (clamp(place, 0.0, 1.0) * (samples - 1.0) + 0.5) / samples).rg;
     vec3 level = normalize(vec3(-slope, 1.0));

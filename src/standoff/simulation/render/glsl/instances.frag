@@ -23,12 +23,15 @@ void main() {
     albedo *= 1.0 - pattern.z * dirt;
     albedo *= 1.0 + pattern.w * (stain.b - 0.5) * vec3(1.0, 0.1, -0.8);
     float up = 0.5 + 0.5 * normal.z;
-    float dust = clamp(v_albedo_dust.a * gloss.w * (0.35 + 1.0 * up * up) * (0.3 + 1.4 * stain.r) + 0.3 * v_albedo_dust.a * (grain.r - 0.5), 0.0, 0.95);
+    float settled = gloss.w * (0.35 + up * up) * (0.3 + 1.4 * stain.r) + 0.3 * (grain.r - 0.5);
+    float dust = clamp(v_albedo_dust.a * settled, 0.0, 0.95);
     albedo = clamp(mix(albedo, dust_colour * (0.9 + 0.2 * grain.r), dust), 0.0, 0.9);
     float roughness = mix(gloss.x + 0.15 * (stain.r - 0.5), 0.95, dust);
     normal = normalize(normal + gloss.z * (1.0 - dust) * vec3(grain.ba - 0.5, 0.0));
     float open = texture(openness, gl_FragCoord.xy * openness_scale).r;
     float lit = dot(normal, to_sun) > 0.0 ? sunlit(v_offset, normal, false) : 0.0;
     vec3 light = shade(albedo, normal, to_eye, clamp(roughness, 0.06, 1.0), gloss.y * (1.0 - dust), lit, open);
+    float sunward = max(dot(to_eye, to_sun), 0.0);
+    light += albedo * stretch.w * (0.3 * sky + sun * lit * sunward * sunward);
     radiance = vec4(min(hazy(light, away), vec3(30.0)), 1.0);
 }

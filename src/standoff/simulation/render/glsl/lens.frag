@@ -41,7 +41,8 @@ void main() {
     // Straight up to the knee, then a shoulder that reaches white only far above it.
     const float KNEE = 0.55;
     vec3 above = max(light - KNEE, vec3(0.0)) / (1.0 - KNEE);
-    light = min(light, vec3(KNEE)) + (1.0 - KNEE) * (above + 0.12 * above * above) / (1.0 + above + 0.12 * above * above);
+    vec3 bent = above + 0.12 * above * above;
+    light = min(light, vec3(KNEE)) + (1.0 - KNEE) * bent / (1.0 + bent);
     light = mix(vec3(tone.y), vec3(1.0), light);
     colour = vec4(encoded(clamp(light, 0.0, 1.0)).bgr, 1.0);
 }

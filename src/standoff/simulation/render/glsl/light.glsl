@@ -2,7 +2,7 @@
 uniform vec3 to_sun, sun, sky, bounce, haze_colour;
 uniform float haze_per_m;
 uniform mat4 shadow_from_offset;      // to texture coordinates and depth of the shadow map, 0..1
-uniform vec4 shadow_scale;            // metres a texel, penumbra texels per unit of depth, depth of one metre, texel size
+uniform vec4 shadow_scale;            // metres a texel, penumbra texels per depth, depth of one metre, size of a texel
 uniform sampler2DShadow shadow_map;
 uniform sampler2D shadow_depth;
 uniform sampler2D openness;           // ambient occlusion of the drawn picture

@@ -32,7 +32,8 @@ void main() {
         float angle = turn + 2.39996 * float(i);
         vec3 toward = point(pixel + radius_px * share * sqrt(share) * vec2(cos(angle), sin(angle))) - centre;
         float squared = dot(toward, toward);
-        hidden += max(dot(toward, normal) - 0.015 - 0.0007 * centre.z, 0.0) * inversesqrt(squared + 0.001) / (1.0 + 0.25 * squared);
+        float rise = max(dot(toward, normal) - 0.015 - 0.0007 * centre.z, 0.0);
+        hidden += rise * inversesqrt(squared + 0.001) / (1.0 + 0.25 * squared);
     }
     open = max(exp(-4.5 * hidden / float(TAPS)), 0.1);
 }
