@@ -34,6 +34,7 @@ def test_check_reads_the_files_that_the_settings_name(call: Call, site: Path, tm
         ("calibrate",),
         ("evaluate",),
         ("evaluate", "positions"),
+        ("evaluate", "paper"),
         ("config",),
         ("bench",),
         ("doctor",),

@@ -3,6 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapely
+import trimesh
 from scipy.interpolate import LinearNDInterpolator
 
 from standoff.core.errors import ConfigError
@@ -175,6 +176,14 @@ def height_over(batch: Batch, xy_m: FloatArray) -> FloatArray:
     return np.asarray(LinearNDInterpolator(points[upwards, :2], points[upwards, 2], fill_value=-np.inf)(xy_m))
 
 
+def highest_over(batch: Batch, xy_m: FloatArray) -> FloatArray:
+    """Return (N,) heights of the highest surface over points, for a mesh of several bodies."""
+    points = points_m(batch)
+    bodies = trimesh.graph.connected_components(trimesh.Trimesh(points, batch.mesh.triangles, process=False).edges)
+    heights = [LinearNDInterpolator(points[body, :2], points[body, 2], fill_value=-np.inf)(xy_m) for body in bodies]
+    return np.asarray(np.max(heights, axis=0))
+
+
 @pytest.mark.parametrize("shape", ["square_footing", "quadrilateral_footing", "painted_square"])
 @pytest.mark.parametrize("kind", ["sand_corner", "plate", "tarpaulin"])
 @pytest.mark.parametrize("seed", SEEDS)
@@ -190,6 +199,20 @@ def test_a_cover_hides_a_whole_corner(shape: str, kind: str, seed: int) -> None:
         spots = spots[[outline.buffer(1e-6).contains(shapely.Point(spot)) for spot in spots]]
         hidden.append(bool(np.all(height_over(batch, spots) > corner[2])))
     assert sum(hidden) == 1
+
+
+@pytest.mark.parametrize("shape", ["square_footing", "quadrilateral_footing", "painted_square"])
+@pytest.mark.parametrize("seed", SEEDS[:2])
+def test_sand_along_a_side_hides_that_edge_and_its_corners(shape: str, seed: int) -> None:
+    reference = reference_of(shape, seed)
+    heaps = cover_of("sand_side", reference, seed)
+    top = reference.top_m
+    share = np.linspace(0.0, 1.0, 101)[:, None, None]
+    lines = top * (1 - share) + np.roll(top, -1, axis=0) * share
+    heights_m = highest_over(heaps, lines[..., :2].reshape(-1, 2)).reshape(101, 4)
+    hidden = (heights_m > lines[..., 2]).mean(axis=0)
+    assert sorted(hidden)[-1] > 0.97
+    assert sorted(hidden)[0] == 0.0
 
 
 @pytest.mark.parametrize("shape", ["square_footing", "quadrilateral_footing", "painted_square"])

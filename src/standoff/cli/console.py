@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Generator, Iterable, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from time import monotonic
 from typing import TYPE_CHECKING
 
 import typer
@@ -69,3 +71,21 @@ def progress_bar(*, quiet: bool, unit: str = "frames") -> Progress:
         console=Console(stderr=True),
         disable=quiet or not sys.stderr.isatty(),
     )
+
+
+@contextmanager
+def progress(
+    what: str, total: int, *, quiet: bool = False, unit: str = "frames"
+) -> Generator[Callable[[], None], None, None]:
+    """Show the progress of one task; give what is to be called after each step."""
+    with progress_bar(quiet=quiet, unit=unit) as bar:
+        task = bar.add_task(what, total=total, rate=0.0)
+        started_s = monotonic()
+        done = 0
+
+        def step() -> None:
+            nonlocal done
+            done += 1
+            bar.update(task, completed=done, rate=done / (monotonic() - started_s))
+
+        yield step

@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from time import monotonic
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from standoff.core.errors import ConfigError
+from standoff.core.errors import ConfigError, StandoffError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from rich.progress import Progress
-
     from standoff.evaluation.paper import BoxError, ClipResult, Trial
+    from standoff.simulation.presets import Plan
 
 Method = Literal["paper", "paper+tls", "oriented"]
 Anchor = Literal["bottom_centre", "box_centre"]
@@ -54,6 +49,8 @@ def paper(
     frames: Annotated[int | None, typer.Option(min=1, help="For --all: render so many frames.")] = None,
 ) -> None:
     """Repeat the paper's tests on clips with exact truth: every figure beside the paper's own."""
+    from standoff.cli.console import write_json
+    from standoff.cli.paper_tables import print_results
     from standoff.evaluation.paper import Trial, write_report
 
     trial = Trial(method, _detector(detector), anchor, _box_error(detector, box_error), seed)
@@ -64,12 +61,21 @@ def paper(
             found="both" if folders else "neither",
             fix="write for example `standoff evaluate paper clips/mobile`",
         )
+    plans: dict[Path, Plan] = {}
     if every_preset:
-        folders = _every_preset(clips_folder, seed, size, frames)
-    results = _evaluate(folders, trial)
-    if report is not None:
-        write_report(results, report)
-    _tell(results, json_file)
+        plans = _plan_presets(clips_folder, seed, size, frames)
+        folders = list(plans)
+    results, failures = _evaluate_all(folders, plans, trial)
+    if json_file is not None:
+        write_json(_as_json(results, failures), json_file)
+    if results and str(json_file) != "-":
+        print_results(results)
+    if results and report is not None:
+        write_report(results, report, failures)
+    for name, error in failures.items():
+        typer.echo(f"standoff: {name}: {error}", err=True)
+    if failures:
+        raise typer.Exit(2)
 
 
 def _detector(text: str) -> Boxes | Path:
@@ -108,101 +114,57 @@ def _box_error(detector: str, text: str | None) -> BoxError:
     return BoxError(share=number / 100.0) if text.endswith("%") else BoxError(px=number)
 
 
-def _every_preset(folder: Path | None, seed: int, size: str | None, frames: int | None) -> list[Path]:
-    """Return a folder for each preset; render what is not there yet."""
+def _plan_presets(folder: Path | None, seed: int, size: str | None, frames: int | None) -> dict[Path, Plan]:
+    """Return a folder for each preset, with what to render where there is no clip yet."""
     from standoff.cli.simulate import parse_size
     from standoff.simulation.presets import PRESETS, plan_clip
-    from standoff.simulation.record import record_clip
 
     if folder is None:
         raise ConfigError(expected="--clips FOLDER with --all", found="none", fix="say where the clips are or shall be")
     width_px, height_px = parse_size(size)
-    plans = {
+    return {
         folder / name: plan_clip(name, seed=seed, width_px=width_px, height_px=height_px, frames=frames)
         for name in PRESETS
-        if not (folder / name / "scene.json").is_file()
     }
-    for path, plan in plans.items():
-        with _progress(f"rendering {plan.name}", plan.preset.frames) as on_frame:
-            record_clip(plan, path, on_frame=on_frame)
-    return [folder / name for name in PRESETS]
 
 
-def _evaluate(folders: Sequence[Path], trial: Trial) -> list[ClipResult]:
+def _evaluate_all(
+    folders: Sequence[Path], plans: Mapping[Path, Plan], trial: Trial
+) -> tuple[list[ClipResult], dict[str, StandoffError]]:
+    """Evaluate every clip that can be; render first what is planned and not there."""
+    results, failures = [], {}
+    for folder in folders:
+        try:
+            if folder in plans and not (folder / "scene.json").is_file():
+                _render(plans[folder], folder)
+            results.append(_evaluate(folder, trial))
+        except StandoffError as error:
+            failures[folder.name or str(folder)] = error
+    return results, failures
+
+
+def _render(plan: Plan, folder: Path) -> None:
+    from standoff.cli.console import progress
+    from standoff.simulation.record import record_clip
+
+    with progress(f"rendering {plan.name}", plan.preset.frames) as on_frame:
+        record_clip(plan, folder, on_frame=on_frame)
+
+
+def _evaluate(folder: Path, trial: Trial) -> ClipResult:
+    from standoff.cli.console import progress
     from standoff.evaluation.paper import evaluate_clip, load_clip
 
-    loaded = [load_clip(folder) for folder in folders]
-    results = []
-    for clip in loaded:
-        passes = (clip.reference is not None) + (clip.board is not None)
-        with _progress(f"watching {clip.name}", passes * clip.frame_count) as on_frame:
-            results.append(evaluate_clip(clip, trial, on_frame))
-    return results
+    clip = load_clip(folder)
+    with progress(f"watching {clip.name}", clip.frame_count) as on_frame:
+        return evaluate_clip(clip, trial, on_frame)
 
 
-@contextmanager
-def _progress(title: str, total: int) -> Iterator[Callable[[], None]]:
-    """Show a progress bar; give what is to be called after each frame."""
-    from standoff.cli.console import progress_bar
-
-    with progress_bar(quiet=False) as bar:
-        task = bar.add_task(title, total=total, rate=0.0)
-        started = monotonic()
-        yield lambda: _advance(bar, started)
-        bar.remove_task(task)
-
-
-def _advance(bar: Progress, started: float) -> None:
-    (task,) = bar.tasks
-    bar.update(task.id, advance=1, rate=(task.completed + 1) / (monotonic() - started))
-
-
-def _tell(results: Sequence[ClipResult], json_file: Path | None) -> None:
+def _as_json(results: Sequence[ClipResult], failures: Mapping[str, StandoffError]) -> dict[str, Any]:
     from standoff import __version__
-    from standoff.cli.console import print_table, write_json
 
-    if json_file is not None:
-        write_json({"standoff": __version__, "clips": [result.to_dict() for result in results]}, json_file)
-    if str(json_file) == "-":
-        return
-    for result in results:
-        _tell_clip(result)
-    mapped = [(result, result.rectification) for result in results if result.rectification is not None]
-    if mapped:
-        headings = ("clip", "frames", "reference unseen", "failed", "wrong", "corner rmse px", "within 5 px %")
-        lines = [
-            (result.clip.name, f"{score.frames}", f"{score.not_visible}", f"{score.failed}", f"{score.wrong}",
-             f"{score.corner_rmse_px:.3f}", f"{100 * score.within_share:.1f}")
-            for result, score in mapped
-        ]  # fmt: skip
-        caption = "Failed: no map although the reference can be seen, or a wrong one: a corner more than 5 px off."
-        print_table("Rectification", headings, lines, caption)
-    facts = "; ".join(f"{name}: {value}" for name, value in results[0].trial.describe().items())
-    print_table("", ("", ""), [("tried", facts)], texts=2)
-
-
-def _tell_clip(result: ClipResult) -> None:
-    from standoff.cli.console import print_table
-    from standoff.evaluation.paper.report import number_text
-
-    figures = [
-        (figure.label, number_text(figure.paper, figure.unit), number_text(figure.measured, figure.unit),
-         number_text(figure.exact_before, figure.unit, none=""), number_text(figure.exact_after, figure.unit, none=""),
-         f"{figure.count} of {figure.of}")
-        for figure in result.figures()
-    ]  # fmt: skip
-    if figures:
-        columns = ("figure", "paper", "measured", "before", "after", "frames")
-        caption = "Measured: as the paper did. Before and after the outlier filter: against exact truth."
-        if result.trial.detector == "truth" and any(figure.name.startswith("ale") for figure in result.figures()):
-            caption += " With true boxes ALE is 0 by construction."
-        print_table(f"{result.clip.name}: beside the paper", columns, figures, caption)
-    distances = [
-        (group.class_pair.replace("_", " "), name, f"{score.measured} of {score.frames}",
-         number_text(score.made_m, "m"), number_text(score.mape_percent, "%"), number_text(score.median_m, "m"))
-        for group in result.groups
-        for name, score in group.scores.items()
-    ]  # fmt: skip
-    if distances:
-        columns = ("pair", "compared", "measured", "MADE", "MAPE", "median")
-        print_table(f"{result.clip.name}: distances", columns, distances, texts=2)
+    return {
+        "standoff": __version__,
+        "clips": [result.to_dict() for result in results],
+        "failed": [{"clip": name, "why": str(error)} for name, error in failures.items()],
+    }

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
-from time import monotonic
 from typing import Annotated, Any, Literal
 
 import typer
@@ -76,6 +74,7 @@ def _clip_command(name: str) -> Callable[..., None]:
         overwrite: _Overwrite = False,
         quiet: _Quiet = False,
     ) -> None:
+        from standoff.cli.console import progress
         from standoff.simulation.presets import plan_clip
         from standoff.simulation.record import record_clip
 
@@ -84,7 +83,7 @@ def _clip_command(name: str) -> Callable[..., None]:
             name, seed=seed, masks=masks, variable_rate=variable_rate, excavator_mesh=excavator_mesh, frames=frames,
             fps=fps, altitude_m=altitude, pitch_deg=pitch, width_px=width_px, height_px=height_px,
         )  # fmt: skip
-        with _progress(f"rendering {name}", plan.preset.frames, quiet=quiet) as step:
+        with progress(f"rendering {name}", plan.preset.frames, quiet=quiet) as step:
             record_clip(plan, out, overwrite=overwrite, processes=processes, on_frame=step)
         typer.echo(f"{out}/video.mp4 and its truth; measure with: standoff evaluate paper {out}")
 
@@ -113,6 +112,7 @@ def dataset(
     quiet: _Quiet = False,
 ) -> None:
     """Render independent scenes for training, split by scene."""
+    from standoff.cli.console import progress
     from standoff.simulation.dataset import DatasetPlan, record_dataset
 
     width_px, height_px = parse_size(size)
@@ -120,7 +120,7 @@ def dataset(
         images=images, per_scene=per_scene, width_px=width_px or 0, height_px=height_px or 0, layout=layout,
         held_out=held_out, seed=seed, excavator_mesh=excavator_mesh,
     )  # fmt: skip
-    with _progress("rendering", images, quiet=quiet, unit="pictures") as step:
+    with progress("rendering", images, quiet=quiet, unit="pictures") as step:
         record_dataset(plan, out, overwrite=overwrite, processes=processes, on_picture=step)
     typer.echo(f"{images} pictures in {out}")
 
@@ -130,18 +130,3 @@ def parse_size(size: str | None) -> tuple[int | None, int | None]:
     if size is None:
         return None, None
     return two_integers(size, "x", expected="a size as WIDTHxHEIGHT", example="1920x1080")
-
-
-@contextmanager
-def _progress(what: str, total: int, *, quiet: bool, unit: str = "frames") -> Generator[Callable[[], None], None, None]:
-    from standoff.cli.console import progress_bar
-
-    with progress_bar(quiet=quiet, unit=unit) as bar:
-        task = bar.add_task(what, total=total, rate=0.0)
-        started = monotonic()
-
-        def step() -> None:
-            done = bar.tasks[task].completed + 1
-            bar.update(task, completed=done, rate=done / (monotonic() - started))
-
-        yield step

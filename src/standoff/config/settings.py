@@ -54,7 +54,11 @@ class ReferenceSettings(_Section):
         float | None, Field(ge=0, description="The time of that frame; s. Absent: the first frame that is read.")
     ] = None
     first_corner_px: Annotated[
-        Point | None, Field(description="Picture point nearest the first corner in that frame; px.")
+        Point | None,
+        Field(
+            description="Picture point nearest the first corner in that frame; without box_px in the frame in which "
+            "the detector first sees the reference; px."
+        ),
     ] = None
     params: Annotated[ReferenceParams, Field(description="How its corners are found.")] = ReferenceParams()
 

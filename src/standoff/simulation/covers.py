@@ -10,7 +10,7 @@ import numpy as np
 
 from standoff.core.errors import ConfigError
 from standoff.core.homography import FloatArray
-from standoff.simulation.mesh import Mesh, Surface, rotation, srgb, translation
+from standoff.simulation.mesh import Mesh, Surface, join, rotation, srgb, translation
 from standoff.simulation.props.materials import (
     BARE_STEEL,
     SANDS,
@@ -28,6 +28,9 @@ from standoff.simulation.scene import Cover, Ground, Reference, place
 _TARPAULINS = tuple(srgb(code) for code in ("#2f5f8f", "#4d6b4a", "#8a8c8a", "#3b3c3e"))
 _STEEPNESS = 0.6
 """Height over run of sand that has come to rest: 31 degrees."""
+
+
+_SIDE_LOADS = 6
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,9 +150,20 @@ def _make_plate(rng: np.random.Generator, bed: _Bed) -> Laid:
     return spot_m, plate.moved(rotation("z", rng.uniform(0.0, 360.0))), (BARE_STEEL,) if steel else WOODS
 
 
+def _make_sand_side(rng: np.random.Generator, bed: _Bed) -> Laid:
+    """Sand tipped all along one side, load by load: the edge and both its corners are under it."""
+    number = int(rng.integers(4))
+    start_m, stop_m = bed.corners_m[number], bed.corners_m[(number + 1) % 4]
+    loads = [_heap_on(rng, bed, start_m + share * (stop_m - start_m)) for share in np.linspace(0.0, 1.0, _SIDE_LOADS)]
+    middle_m = bed.middle_of_edge(number)
+    heaps = [heap.at(*(spot_m - middle_m).tolist(), 0.0) for spot_m, heap, _ in loads]
+    return middle_m, join(heaps), loads[0][2]
+
+
 _MAKERS: Mapping[str, Callable[[np.random.Generator, _Bed], Laid]] = MappingProxyType({
     "sand_corner": _make_sand_corner,
     "sand_edge": _make_sand_edge,
+    "sand_side": _make_sand_side,
     "sand_blanket": _make_sand_blanket,
     "plate": _make_plate,
     "tarpaulin": _make_tarpaulin,

@@ -115,6 +115,8 @@ class _Yard:
         self.extent_m = extent_m
         self.taken_m2 = 0.0
         for area in keep_clear:
+            if area.is_empty:  # cv2 refuses an outline without points
+                continue
             outline = np.asarray(area.buffer(_MARGIN_M).exterior.coords)
             cv2.fillPoly(self._taken, [self._pixels(outline)], 1, shift=_SHIFT)
 

@@ -18,6 +18,7 @@ import yaml
 from standoff import __version__
 from standoff.core.classes import CLASSES
 from standoff.core.homography import FloatArray
+from standoff.core.pose import View
 from standoff.simulation.coco import Annotations
 from standoff.simulation.crew import work_through
 from standoff.simulation.output import whole_folder
@@ -84,7 +85,7 @@ def record_clip(
         _save_json(annotations.to_dict(f"standoff {plan.name}, seed {plan.seed}"), folder / "annotations.json")
         _save_json(describe_scene(plan, site), folder / "scene.json")
         save_camera(site.camera, folder / "camera.yaml")
-        _save_reference(site.scene.reference, folder / "reference.yaml")
+        _save_reference(site.scene.reference, site.scene.flight.view(times_s[0]), folder / "reference.yaml")
         errors = np.random.default_rng([plan.seed, 1299709])
         shown = ShownSettings(iso=round(site.sensor.iso), shutter_hz=1 / site.shutter_s)
         write_telemetry(folder / "telemetry.srt", site.scene.flight, times_s, errors, shown)
@@ -156,9 +157,15 @@ def _describe_reference(reference: Reference) -> dict[str, Any]:
     }
 
 
-def _save_reference(reference: Reference | None, path: Path) -> None:
-    ground = {} if reference is None else {"reference": {"corners_m": reference.top_m[:, :2].tolist()}}
-    path.write_text(yaml.safe_dump({"ground": {**ground, "camera": "camera.yaml"}}, sort_keys=False))
+def _save_reference(reference: Reference | None, view: View, path: Path) -> None:
+    """Write settings with the reference object's shape; a hint tells its corners apart where its shape does not."""
+    ground: dict[str, Any] = {"camera": "camera.yaml"}
+    if reference is not None:
+        first_px = view.project(reference.top_m[:1])[0]
+        size_px = (view.camera.width_px, view.camera.height_px)
+        hint = {"first_corner_px": first_px.tolist()} if ((first_px >= 0) & (first_px < size_px)).all() else {}
+        ground["reference"] = {"corners_m": reference.top_m[:, :2].tolist(), **hint}
+    path.write_text(yaml.safe_dump({"ground": ground}, sort_keys=False))
 
 
 def _save_json(content: dict[str, Any], path: Path) -> None:

@@ -94,7 +94,8 @@ def _write_tables(folder: Path) -> None:
     pq.write_table(pa.Table.from_pylist(frames), folder / "frames.parquet")
     integers, floats = pa.int32(), pa.float64()
     truth = [("frame", integers), ("entity_id", integers), ("class_id", integers)]
-    truth += [(name, floats) for name in ("x_m", "y_m", "x1_px", "y1_px", "x2_px", "y2_px")]
+    places = ("x_m", "y_m", "foot_x_px", "foot_y_px", "x1_px", "y1_px", "x2_px", "y2_px")
+    truth += [(name, floats) for name in places]
     pairs = [("frame", integers), ("entity_a", integers), ("entity_b", integers), ("centre_m", floats)]
     for name, schema in (("truth", truth), ("pairs", pairs)):
         pq.write_table(pa.schema(schema).empty_table(), folder / f"{name}.parquet")

@@ -133,12 +133,17 @@ def _entity_row(frame: int, entity: Entity) -> dict[str, Any]:
     if entity.class_name == "excavator" and frame in UNSEEN:
         box = dict.fromkeys(box, float("nan"))
     ids = {"frame": frame, "entity_id": entity.entity_id, "class_id": entity.class_id}
-    return ids | {"x_m": float(xy_m[0]), "y_m": float(xy_m[1])} | box
+    return ids | _place(frame, xy_m) | box
+
+
+def _place(frame: int, xy_m: FloatArray) -> dict[str, float]:
+    ((foot_x_px, foot_y_px),) = seen_px(frame, xy_m[None]).tolist()
+    return {"x_m": float(xy_m[0]), "y_m": float(xy_m[1]), "foot_x_px": foot_x_px, "foot_y_px": foot_y_px}
 
 
 def _reference_row(frame: int) -> dict[str, Any]:
     ids = {"frame": frame, "entity_id": REFERENCE_ID, "class_id": 6}
-    return ids | {"x_m": SIDE_M / 2, "y_m": SIDE_M / 2} | _box(seen_px(frame, SQUARE_M))
+    return ids | _place(frame, SQUARE_M.mean(axis=0)) | _box(seen_px(frame, SQUARE_M))
 
 
 def _frame_row(frame: int) -> dict[str, Any]:

@@ -279,9 +279,20 @@ def test_a_box_or_camera_that_does_not_fit_the_pictures_is_refused() -> None:
         ReferenceGround(FOOTING, box_xyxy_px=box, camera=square_camera).update(frame(gray), NOTHING)
 
 
-def test_a_hint_needs_a_box_and_lies_in_it() -> None:
-    with pytest.raises(GroundError, match="first_corner_px alone"):
-        ReferenceGround(FOOTING, first_corner_px=(5.0, 5.0))
+def test_a_hint_goes_with_the_first_detection_too() -> None:
+    shape = ReferenceShape.rectangle(2.8, 2.9)
+    gray, ground_to_image, box = seen(shape)
+    corners_px = homography.apply(ground_to_image, shape.corners_m)[0]
+    for corner in range(4):
+        stage = ReferenceGround(shape, first_corner_px=corners_px[corner])
+        assert reason(stage.update(frame(gray), NOTHING)) == NOT_SEEN
+        ground = mapped(stage.update(frame(gray, 0.1), detected(box)))
+        np.testing.assert_allclose(ground.anchors_px[0], corners_px[corner], atol=0.5)
+
+
+def test_a_hint_lies_in_its_box() -> None:
+    with pytest.raises(GroundError, match="first_corner_px x, y"):
+        ReferenceGround(FOOTING, first_corner_px=(5.0, float("nan")))
     for bad in ((500.0, 5.0), (float("nan"), 5.0), (1.0, 2.0, 3.0)):
         with pytest.raises(GroundError, match="first_corner_px x, y"):
             ReferenceGround(FOOTING, box_xyxy_px=(0.0, 0.0, 50.0, 50.0), first_corner_px=bad)

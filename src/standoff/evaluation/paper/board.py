@@ -23,6 +23,7 @@ class BoardScore:
     """Accuracies (Eq. 7) in per cent, NaN where no board was found; by frame (F) or over all measured frames.
 
     Attributes:
+        corners: Of the board.
         frames: Of the clip.
         measured: Of these, with a whole board that could be measured.
         before: (F,) before rectification.
@@ -38,6 +39,7 @@ class BoardScore:
         misplaced: Frames in which a found corner is more than 5 px off.
     """
 
+    corners: int
     frames: int
     measured: int
     before: FloatArray
@@ -90,6 +92,7 @@ def score_board(clip: Clip, board: TrueBoard, views: list[BoardView]) -> BoardSc
         before[index], after[index] = view.before_percent, view.after_percent
     none, error_px = float("nan"), _corner_errors_px(views, board)
     return BoardScore(
+        corners=board.side**2,
         frames=frames,
         measured=int(np.isfinite(after).sum()),
         before=before,

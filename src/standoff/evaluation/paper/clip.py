@@ -69,10 +69,11 @@ class Clip:
         class_id: (E,) ids of `CLASSES`.
         box_px: (F, E, 4) visible part; NaN where nothing can be seen.
         xy_m: (F, E, 2) centre of the footprint, site frame.
+        foot_px: (F, E, 2) where the picture shows that centre, inside or outside.
         reference_box_px: (F, 4) visible part of the reference; NaN where nothing can be seen, or without one.
-        pairs: (P, 2) rows of E: each person with each machine, the person first.
+        pairs: (P, 2) rows of E: each person with each machine between which there is a distance, the person first.
         distance_m: (F, P) true distance, centre to centre.
-        reference: None without one.
+        reference: None without one, or with a checkerboard.
         board: None without one.
     """
 
@@ -84,6 +85,7 @@ class Clip:
     class_id: IntArray
     box_px: FloatArray
     xy_m: FloatArray
+    foot_px: FloatArray
     reference_box_px: FloatArray
     pairs: IntArray
     distance_m: FloatArray
@@ -134,7 +136,9 @@ def load_clip(folder: Path | str) -> Clip:
         if len(table["frame"]) and not 0 <= table["frame"].min() <= table["frame"].max() < count:
             found = f"others in {folder / name}.parquet"
             raise DataError(expected=f"frames from 0 to {count - 1} as in frames.parquet", found=found, fix=_FIX)
-    reference, board = _reference(scene, frames, folder), _board(scene, frames, folder)
+    board = _board(scene, frames, folder)
+    # A checkerboard is measured by its own corners; its outline is none of the paper's reference objects.
+    reference = None if board is not None else _reference(scene, frames, folder)
     if reference is None and board is None:
         raise DataError(
             expected="a clip with a reference object or a checkerboard",
@@ -208,8 +212,9 @@ def _assemble(
     board: TrueBoard | None,
 ) -> Clip:
     entity_ids, rows = np.unique(truth["entity_id"], return_inverse=True)
-    everything = np.full((count, len(entity_ids), 6), np.nan)
-    columns = [truth[name] for name in ("x1_px", "y1_px", "x2_px", "y2_px", "x_m", "y_m")]
+    names = ("x1_px", "y1_px", "x2_px", "y2_px", "x_m", "y_m", "foot_x_px", "foot_y_px")
+    everything = np.full((count, len(entity_ids), len(names)), np.nan)
+    columns = [truth[name] for name in names]
     everything[truth["frame"], rows] = np.column_stack(columns)
     class_id = np.zeros(len(entity_ids), dtype=np.int64)
     class_id[rows] = truth["class_id"]
@@ -229,7 +234,8 @@ def _assemble(
         entity_id=entity_ids[own].astype(np.int64),
         class_id=class_id[own],
         box_px=everything[:, own, :4],
-        xy_m=everything[:, own, 4:],
+        xy_m=everything[:, own, 4:6],
+        foot_px=everything[:, own, 6:],
         reference_box_px=reference_box,
         pairs=which,
         distance_m=distance_m,
@@ -248,4 +254,7 @@ def _distances(pairs: Columns, entity_id: IntArray, class_id: IntArray, count: i
     square = np.full((count, len(entity_id), len(entity_id)), np.nan)
     first, second = (np.searchsorted(entity_id, pairs[name]) for name in ("entity_a", "entity_b"))
     square[pairs["frame"], first, second] = square[pairs["frame"], second, first] = pairs["centre_m"]
-    return which, square[:, which[:, 0], which[:, 1]]
+    distance_m = square[:, which[:, 0], which[:, 1]]
+    # Vehicles parked in the street keep no distance to anybody.
+    known = np.isfinite(distance_m).any(axis=0)
+    return which[known], distance_m[:, known]

@@ -10,7 +10,7 @@ import pyarrow.parquet
 from standoff.core.errors import DataError
 from standoff.evaluation.positions_input import Columns
 
-TRUTH = ("frame", "entity_id", "class_id", "x_m", "y_m", "x1_px", "y1_px", "x2_px", "y2_px")
+TRUTH = ("frame", "entity_id", "class_id", "x_m", "y_m", "x1_px", "y1_px", "x2_px", "y2_px", "foot_x_px", "foot_y_px")
 PAIRS = ("frame", "entity_a", "entity_b", "centre_m")
 REFERENCE_PX = ("reference_top_x_px", "reference_top_y_px")
 FRAMES = ("frame", "reference_covered", "reference_visible_share", *REFERENCE_PX, "board_x_px", "board_y_px")

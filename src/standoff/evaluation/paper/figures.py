@@ -11,35 +11,38 @@ from standoff.evaluation.paper.board import BoardScore
 from standoff.evaluation.paper.pairs import PairSeries
 from standoff.evaluation.paper.watch import Watched
 from standoff.evaluation.rectification import FAILURE_PX
-from standoff.stages.sinks.charts import _INK as INK
-from standoff.stages.sinks.charts import _MUTED as MUTED
-from standoff.stages.sinks.charts import _figure as themed_figure
-from standoff.stages.sinks.charts import _svg as inline_svg
+from standoff.stages.sinks.charts import INK, MUTED, inline_svg, themed_figure
 from standoff.stages.sinks.palette import HEX
 
 ESTIMATE, RAW, TREND = HEX["worker"], HEX["warning"], HEX["machine"]
 _HEADROOM = 0.35
+_MANY_FRAMES = 100
 
 
-def pair_chart(series: PairSeries) -> str:
-    """Draw one pair's distance over the frames, and how its residuals are spread (Figs. 10, 11 and 13)."""
+def pair_chart(series: PairSeries, paper_median_m: float | None = None) -> str:
+    """Draw one pair's distance over the frames, and how its residuals are spread (Figs. 10, 11 and 13).
+
+    Args:
+        series: What to draw.
+        paper_median_m: The paper's own median residual, if it has one.
+    """
     with themed_figure(10.0, 3.3) as figure:
         over_time, spread = figure.subplots(1, 2, width_ratios=(3.6, 1.0))
         _draw_distances(over_time, series)
-        _draw_residuals(spread, series)
+        _draw_residuals(spread, series, paper_median_m)
         return inline_svg(figure)
 
 
 def corner_chart(watched: Watched, failed: BoolArray) -> str:
     """Draw the worst corner's error over the frames, on a logarithmic scale."""
-    with themed_figure(10.0, 2.2) as figure:
+    with themed_figure(10.0, 2.5) as figure:
         axes = figure.add_subplot()
         _shade(axes, failed)
         worst_px = np.maximum(watched.corner_error_px.max(axis=1), 1e-3)
         frame = np.arange(len(worst_px))
-        axes.semilogy(frame, worst_px, ".", markersize=3.5, color=ESTIMATE)
+        axes.semilogy(frame, worst_px, ".", markersize=_marker_size(len(frame)), color=ESTIMATE)
         axes.axhline(FAILURE_PX, color=HEX["danger"], linewidth=0.9, linestyle=(0, (5, 3)))
-        axes.set_ylabel("worst corner, px")
+        axes.set_ylabel("error of the worst corner, px")
         axes.set_ylim(bottom=min(0.1, 0.8 * np.nanmin(worst_px, initial=0.1)))
         axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axes.yaxis.set_minor_formatter(NullFormatter())
@@ -71,7 +74,9 @@ def _draw_distances(axes: Axes, series: PairSeries) -> None:
     low, high = _limits(series)
     _shade(axes, series.failed)
     # What lies outside is drawn on the edge rather than left out.
-    axes.plot(frame, np.clip(series.before_m, low, high), ".", markersize=3.5, color=RAW, clip_on=False)
+    axes.plot(
+        frame, np.clip(series.before_m, low, high), ".", markersize=_marker_size(len(frame)), color=RAW, clip_on=False
+    )
     if series.benchmark is not None:
         axes.plot(frame, series.benchmark.baseline_m, color=TREND, linewidth=1.0, linestyle=":")
         axes.plot(frame, series.benchmark.trend_m, color=TREND, linewidth=1.6, linestyle=(0, (6, 2)))
@@ -83,13 +88,17 @@ def _draw_distances(axes: Axes, series: PairSeries) -> None:
     _finish(axes, len(frame))
 
 
-def _draw_residuals(axes: Axes, series: PairSeries) -> None:
+def _draw_residuals(axes: Axes, series: PairSeries, paper_median_m: float | None) -> None:
     spreads = [
         ("before", series.before_m - series.truth_m, RAW),
         ("after", series.after_m - series.truth_m, ESTIMATE),
     ]
     if series.benchmark is not None:
         spreads.append(("bench-\nmark", series.benchmark.trend_m - series.truth_m, TREND))
+    names = [name for name, _, _ in spreads]
+    if paper_median_m is not None:
+        names.append("paper")
+        axes.plot(len(spreads), paper_median_m, marker="D", markersize=5, color=INK)
     for place, (_, residual_m, colour) in enumerate(spreads):
         residual_m = residual_m[np.isfinite(residual_m)]
         if not len(residual_m):
@@ -100,9 +109,9 @@ def _draw_residuals(axes: Axes, series: PairSeries) -> None:
             boxprops=line, whiskerprops=line, capprops=line, medianprops={"color": INK, "linewidth": 1.6},
         )  # fmt: skip
     axes.axhline(0.0, color=MUTED, linewidth=0.8)
-    axes.set_xticks(range(len(spreads)), [name for name, _, _ in spreads])
-    axes.set_xlim(-0.6, len(spreads) - 0.4)
-    axes.set_title("error, m", loc="left", fontsize=9)
+    axes.set_xticks(range(len(names)), names)
+    axes.set_xlim(-0.6, len(names) - 0.4)
+    axes.set_title("estimate less truth, m", loc="left", fontsize=9)
     axes.grid(True, axis="y")
 
 
@@ -118,6 +127,10 @@ def _limits(series: PairSeries) -> tuple[float, float]:
         low, high = min(low, truth_m.min()), max(high, truth_m.max())
     room = _HEADROOM * max(high - low, 2.0)
     return max(0.0, low - room), high + room
+
+
+def _marker_size(frames: int) -> float:
+    return 3.5 if frames > _MANY_FRAMES else 7.0
 
 
 def _shade(axes: Axes, failed: BoolArray) -> None:

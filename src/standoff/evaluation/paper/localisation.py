@@ -25,6 +25,8 @@ class ClassScore:
         detected: Of these, detected.
         located: Of these, with a position on the ground.
         ale_m: Eq. 3 over the detected ones; NaN without.
+        map_mean_m: Mean distance on the ground that the map alone makes: the middle of the true footprint, where the
+            picture shows it, through the map, from where it really is; NaN without.
         position_mean_m: Mean distance of the position from the middle of the true footprint; NaN without.
         position_median_m: Median of the same.
         position_p95_m: 95th percentile of the same.
@@ -35,6 +37,7 @@ class ClassScore:
     detected: int
     located: int
     ale_m: float
+    map_mean_m: float
     position_mean_m: float
     position_median_m: float
     position_p95_m: float
@@ -60,14 +63,18 @@ def _score_class(clip: Clip, watched: Watched, class_id: int, scale_m_per_px: Fl
     detected = visible & np.isfinite(detected_px).all(axis=2)
     scale = np.broadcast_to(scale_m_per_px[:, None], detected.shape)
     scored = detected & np.isfinite(scale)
+    located = visible & np.isfinite(watched.xy_m[:, own]).all(axis=2)
+    map_error_m = np.linalg.norm(watched.true_foot_m[:, own] - clip.xy_m[:, own], axis=2)
+    map_error_m = map_error_m[located & np.isfinite(map_error_m)]
     error_m = np.linalg.norm(watched.xy_m[:, own] - clip.xy_m[:, own], axis=2)
-    error_m = error_m[visible & np.isfinite(error_m)]
+    error_m = error_m[located]
     return ClassScore(
         class_name=CLASSES[class_id].name,
         visible=int(visible.sum()),
         detected=int(detected.sum()),
         located=len(error_m),
         ale_m=ale_m(scale[scored], _centre(true_px[scored]), _centre(detected_px[scored])) if scored.any() else np.nan,
+        map_mean_m=float(map_error_m.mean()) if len(map_error_m) else np.nan,
         position_mean_m=float(error_m.mean()) if len(error_m) else np.nan,
         position_median_m=float(np.median(error_m)) if len(error_m) else np.nan,
         position_p95_m=float(np.percentile(error_m, 95)) if len(error_m) else np.nan,

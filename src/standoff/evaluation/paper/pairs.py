@@ -38,7 +38,7 @@ class PairSeries:
         after_m: After the outlier filter; NaN where not measured.
         filled_m: The same with failed rectifications replaced as the paper's filter does.
         failed: Frames whose rectification failed.
-        reason: Why there is no estimate; empty where there is one.
+        reason: Why there is no estimate; empty where there is one, and where the truth has none.
         benchmark: The paper's substitute for truth, where it is made.
     """
 
@@ -105,6 +105,7 @@ def _one_series(
     one, other = watched.reason[:, first], watched.reason[:, second]
     reason = np.where(one != "", one, other)
     reason[np.isnan(after_m) & (reason == "")] = NOT_MEASURED
+    reason[np.isnan(clip.distance_m[:, column])] = ""
     raw_m = np.linalg.norm(watched.annotated_m[:, first] - watched.annotated_m[:, second], axis=1)
     threshold_px = ProximityParams().outlier_threshold_px
     assert threshold_px is not None

@@ -28,6 +28,7 @@ PUBLISHED: Mapping[str, Published] = MappingProxyType(
         "ale wheel_loader": Published(0.37, "m", "Table 3"),
         "ale excavator": Published(0.31, "m", "Table 3"),
         "mobile failed": Published(37, "frames", "8.2: 37 of 398"),
+        "mobile failed share": Published(100 * 37 / 398, "%", "8.2: 37 of 398"),
         "mobile made worker-wheel_loader": Published(0.33, "m", "6.1, Eq. 8"),
         "mobile mape worker-wheel_loader": Published(3.72, "%", "6.1, Eq. 9"),
         "mobile median worker-wheel_loader": Published(0.01, "m", "6.1, Fig. 11"),

@@ -19,21 +19,21 @@ class RectificationScore:
 
     Attributes:
         frames: Of the clip.
-        not_visible: Frames without a map in which the reference cannot be seen at all.
-        failed: Frames without a map in which it can be seen, and frames whose map has a corner more than 5 px off,
+        out_of_sight: Frames without a map in which a corner is outside the picture, or nothing of the reference can be
+            seen.
+        failed: All other frames without a map, and frames whose map has a corner more than 5 px off,
             whatever the outlier filter makes of them.
         wrong: The second kind alone.
         failed_covered: Failed frames in which something lies on it.
         failed_by_reason: Their causes.
         corner_rmse_px: Root mean squared distance of the corners of all other maps; NaN without.
         worst_corner_px: Largest distance over all maps, wrong ones included; NaN without.
-        within_share: Frames whose four corners are all within 5 px, of the frames in which it can be seen; NaN
-            without.
+        within_share: Frames whose four corners are all within 5 px, of all that are not out of sight; NaN without.
         median_s: Of finding the map.
     """
 
     frames: int
-    not_visible: int
+    out_of_sight: int
     failed: int
     wrong: int
     failed_covered: int
@@ -50,13 +50,13 @@ def score_rectification(watched: Watched, reference: TrueReference) -> Rectifica
     has_map = np.isfinite(watched.scale_m_per_px)
     wrong = wrong_frames(watched)
     right = has_map & ~wrong
-    not_visible = ~has_map & (reference.visible_share <= 0.0)
-    failed = wrong | (~has_map & ~not_visible)
+    out_of_sight = ~has_map & (~inside(reference, watched.size_px) | (reference.visible_share <= 0.0))
+    failed = wrong | (~has_map & ~out_of_sight)
     reasons = np.where(wrong, WRONG, watched.no_map)[failed]
-    looked_for = int((~not_visible).sum())
+    looked_for = int((~out_of_sight).sum())
     return RectificationScore(
         frames=len(has_map),
-        not_visible=int(not_visible.sum()),
+        out_of_sight=int(out_of_sight.sum()),
         failed=int(failed.sum()),
         wrong=int(wrong.sum()),
         failed_covered=int((failed & reference.covered).sum()),
@@ -66,6 +66,13 @@ def score_rectification(watched: Watched, reference: TrueReference) -> Rectifica
         within_share=float(right.sum()) / looked_for if looked_for else float("nan"),
         median_s=float(np.median(watched.ground_s)),
     )
+
+
+def inside(reference: TrueReference, size_px: tuple[int, int]) -> BoolArray:
+    """Return (F,) whether all four corners are in the picture; what lies on them does not matter."""
+    # A corner that no lens sees is NaN, and NaN is not inside.
+    in_picture = (reference.corners_px >= -0.5) & (reference.corners_px <= np.array(size_px) - 0.5)
+    return in_picture.all(axis=(1, 2))
 
 
 def wrong_frames(watched: Watched) -> BoolArray:

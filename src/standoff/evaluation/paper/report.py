@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from importlib.resources import files
 from pathlib import Path
@@ -17,23 +17,26 @@ from markupsafe import Markup
 from standoff import __version__
 from standoff.core.errors import OutputError
 from standoff.evaluation.paper.benchmark_polynomial import DEGREE, KEPT_SD, MEDIAN_FRAMES
+from standoff.evaluation.paper.captions import ISOLATES, board_caption, number_text, pair_caption, published_for
 from standoff.evaluation.paper.figures import ESTIMATE, RAW, TREND, board_chart, corner_chart, pair_chart
-from standoff.evaluation.paper.pairs import PairSeries
+from standoff.evaluation.paper.pairs import AFTER, BEFORE, PairSeries
 from standoff.evaluation.paper.rectified import wrong_frames
 from standoff.evaluation.paper.result import ClipResult
 from standoff.evaluation.paper.snapshots import Snapshot
 from standoff.stages.sinks.folder import partial_path
 
 MOST_CHARTS = 4
-_NEAREST_FIRST_M = 1e9
 
 
-def write_report(results: Sequence[ClipResult], path: Path | str) -> None:
+def write_report(
+    results: Sequence[ClipResult], path: Path | str, failures: Mapping[str, Exception] | None = None
+) -> None:
     """Write the page, whole or not at all.
 
     Args:
         results: One section each.
         path: An existing file is replaced.
+        failures: Why others are missing, by their names.
 
     Raises:
         OutputError: The file cannot be written.
@@ -42,14 +45,14 @@ def write_report(results: Sequence[ClipResult], path: Path | str) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         partial = partial_path(path)
-        partial.write_text(render(results), encoding="utf-8")
+        partial.write_text(render(results, failures or {}), encoding="utf-8")
         partial.replace(path)
     except OSError as error:
         found = f"{path}: {error.strerror or error}"
         raise OutputError(expected="a report to write", found=found, fix="choose another path") from error
 
 
-def render(results: Sequence[ClipResult]) -> str:
+def render(results: Sequence[ClipResult], failures: Mapping[str, Exception]) -> str:
     """Return the page."""
     environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True)
     environment.filters.update(number=number_text, percent=_percent, picture=_data_uri, words=_words)
@@ -63,6 +66,10 @@ def render(results: Sequence[ClipResult]) -> str:
         trial=results[0].trial.describe(),
         clips=[_section(result) for result in results],
         colours={"estimate": ESTIMATE, "raw": RAW, "trend": TREND},
+        failures=failures,
+        isolates=ISOLATES,
+        after=AFTER,
+        before=BEFORE,
         degree=DEGREE,
         kept_sd=KEPT_SD,
         median_frames=MEDIAN_FRAMES,
@@ -72,7 +79,7 @@ def render(results: Sequence[ClipResult]) -> str:
 def _section(result: ClipResult) -> dict[str, Any]:
     """Return what the template needs for one clip."""
     watched, snapshots = result.watched, result.watched.snapshots if result.watched else None
-    charted = sorted(result.series, key=_nearest_m)[:MOST_CHARTS]
+    charted = sorted(result.series, key=_unmeasured_and_far)[:MOST_CHARTS]
     corners = ""
     if watched is not None:
         failed = ~np.isfinite(watched.scale_m_per_px) | wrong_frames(watched)
@@ -89,7 +96,8 @@ def _section(result: ClipResult) -> dict[str, Any]:
         "board": result.board,
         "corner_chart": Markup(corners),
         "board_chart": Markup(board_chart(result.board) if result.board else ""),
-        "pair_charts": [Markup(pair_chart(series)) for series in charted],
+        "board_caption": board_caption(result.board) if result.board else "",
+        "pair_charts": [_pair_figure(result, series) for series in charted],
         "pairs_left_out": len(result.series) - len(charted),
         "rectified": snapshots.rectified() if snapshots else None,
         "reference": snapshots.reference() if snapshots else None,
@@ -97,20 +105,14 @@ def _section(result: ClipResult) -> dict[str, Any]:
     }
 
 
-def _nearest_m(series: PairSeries) -> float:
-    return float(np.nanmin(np.append(series.truth_m, _NEAREST_FIRST_M)))
+def _unmeasured_and_far(series: PairSeries) -> tuple[bool, float]:
+    return not np.isfinite(series.before_m).any(), float(np.nanmin(series.truth_m))
 
 
-def number_text(value: float, unit: str = "", none: str = "none") -> str:
-    """Return a measured number for people, `none` where nothing was measured.
-
-    >>> number_text(0.3312, "m"), number_text(37, "frames"), number_text(float("nan"), "%")
-    ('0.33 m', '37 frames', 'none')
-    """
-    if not math.isfinite(value):
-        return none
-    digits = 0 if unit == "frames" else 2 if abs(value) >= 0.1 or value == 0 else 3
-    return f"{value:.{digits}f} {unit}".strip()
+def _pair_figure(result: ClipResult, series: PairSeries) -> dict[str, Any]:
+    paper = published_for(result.clip.preset, series.class_pair)
+    median_m = paper["median"].value if "median" in paper else None
+    return {"svg": Markup(pair_chart(series, median_m)), "caption": pair_caption(result, series)}
 
 
 def _percent(share: float) -> str:

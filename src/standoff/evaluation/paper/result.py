@@ -109,14 +109,14 @@ def evaluate_clip(clip: Clip, trial: Trial, on_frame: Callable[[], None] | None 
     Args:
         clip: From `load_clip`.
         trial: What to try.
-        on_frame: Called after each frame, those of both passes where the clip has a board and a reference object.
+        on_frame: Called after each frame.
 
     Raises:
         StandoffError: The video, the model or the clip cannot be used.
     """
-    board = None if clip.board is None else score_board(clip, clip.board, watch_board(clip, clip.board, on_frame))
-    if clip.reference is None:
-        return ClipResult(clip, trial, board=board)
+    if clip.board is not None:
+        return ClipResult(clip, trial, board=score_board(clip, clip.board, watch_board(clip, clip.board, on_frame)))
+    assert clip.reference is not None, "checked in load_clip"
     watched = watch(clip, trial, on_frame)
     series = pair_series(clip, watched, benchmark=clip.preset in BENCHMARK_PRESETS)
     return ClipResult(
@@ -127,7 +127,6 @@ def evaluate_clip(clip: Clip, trial: Trial, on_frame: Callable[[], None] | None 
         localisation=score_localisation(clip, watched),
         groups=group_pairs(series),
         series=series,
-        board=board,
     )
 
 
@@ -148,7 +147,8 @@ def _rectification_figures(result: ClipResult) -> tuple[PaperFigure, ...]:
     counts = (score.frames, score.frames)
     failed = _figure(f"{preset} failed", f"frames failed of {score.frames}", score.failed, counts)
     time = _figure("rectification time", "time to rectify", score.median_s, counts)
-    return failed + (time if preset == "mobile" else ())
+    share = _figure(f"{preset} failed share", "the same as a share", 100.0 * score.failed / score.frames, counts)
+    return failed + share + (time if preset == "mobile" else ())
 
 
 def _pair_figures(result: ClipResult) -> tuple[PaperFigure, ...]:

@@ -6,13 +6,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
+
 from standoff.config import Settings, build_stage, load_settings
 from standoff.core.errors import DataError
 from standoff.core.protocols import Detector, Tracker
-from standoff.evaluation.paper.clip import Clip
+from standoff.evaluation.paper.clip import Clip, TrueReference
 from standoff.evaluation.paper.truth_detector import REFERENCE_MARGIN_PX, BoxError, TrueBoxes
 from standoff.pipeline import Pipeline
 from standoff.stages.frames import Source
+from standoff.stages.ground import ReferenceShape
 from standoff.stages.ground.params import ReferenceMethod
 from standoff.stages.locate.params import Anchor, LocateParams
 
@@ -107,9 +110,10 @@ def settings_for(clip: Clip, trial: Trial) -> Settings:
         raise DataError(
             expected="a clip with a reference object", found=f"none in {clip.folder}", fix="choose another preset"
         )
-    detected = dict.fromkeys(("box_px", "box_time_s", "first_corner_px"))
+    # The detector says where the reference is, nobody but the clip which of its corners is the first.
+    place = {"box_px": None, "box_time_s": None, "first_corner_px": _first_corner_px(clip, clip.reference)}
     ground: dict[str, Any] = {
-        "reference": {"params": {"method": trial.method}, **detected},
+        "reference": {"params": {"method": trial.method}, **place},
         "camera": str(clip.folder / "camera.yaml") if trial.knows_lens else None,
     }
     overrides: dict[str, Any] = {
@@ -119,6 +123,17 @@ def settings_for(clip: Clip, trial: Trial) -> Settings:
         "model": str(trial.detector) if isinstance(trial.detector, Path) else None,
     }
     return load_settings(clip.folder / "reference.yaml", overrides)
+
+
+def _first_corner_px(clip: Clip, reference: TrueReference) -> list[float] | None:
+    """Return where the shape's first corner is when the reference is first seen; None when it never is."""
+    seen = np.isfinite(clip.reference_box_px).all(axis=1) & np.isfinite(reference.corners_px).all(axis=(1, 2))
+    if not seen.any():
+        return None
+    first_m = ReferenceShape.from_corners(reference.corners_m).corners_m[0]
+    corner = np.linalg.norm(reference.corners_m - first_m, axis=1).argmin()
+    corner_px: list[float] = reference.corners_px[seen.argmax(), corner].tolist()
+    return corner_px
 
 
 def _check_reference_class(detector: Detector, model: Path) -> None:

@@ -42,6 +42,7 @@ class Watched:
         xy_m: (F, E, 2) positions, site frame; NaN where `reason` says why.
         reason: (F, E) why there is no position; empty where there is one.
         annotated_m: (F, E, 2) centres of the true boxes through the frame's own map; NaN without a map.
+        true_foot_m: (F, E, 2) the true footprints' centres in the picture through the frame's own map, site frame.
         distance_m: (F, P) after the outlier filter; NaN where not measured.
         no_map: (F,) why there is no map; empty where there is one.
         scale_m_per_px: (F,) of the map (Eq. 6); NaN without.
@@ -55,6 +56,7 @@ class Watched:
     xy_m: FloatArray
     reason: TextArray
     annotated_m: FloatArray
+    true_foot_m: FloatArray
     distance_m: FloatArray
     no_map: TextArray
     scale_m_per_px: FloatArray
@@ -72,6 +74,7 @@ class Watched:
             xy_m=np.full((frames, entities, 2), np.nan),
             reason=np.full((frames, entities), "", dtype=object),
             annotated_m=np.full((frames, entities, 2), np.nan),
+            true_foot_m=np.full((frames, entities, 2), np.nan),
             distance_m=np.full((frames, len(clip.pairs)), np.nan),
             no_map=np.full(frames, "", dtype=object),
             scale_m_per_px=np.full(frames, np.nan),
@@ -182,6 +185,8 @@ class _Notes:
         boxes_px = self._clip.box_px[frame]
         centres_px = (boxes_px[:, :2] + boxes_px[:, 2:]) / 2.0
         watched.annotated_m[frame] = self._turning.to_site(ground.to_ground(centres_px)[0], turn)
+        foot_m = self._turning.to_site(ground.to_ground(self._clip.foot_px[frame])[0], turn)
+        watched.true_foot_m[frame] = np.where(np.isnan(boxes_px[:, :1]), np.nan, foot_m)
         if is_wrong(error_px):
             watched.snapshots.take_failure(result.frame, true_px, ground, WRONG)
         else:

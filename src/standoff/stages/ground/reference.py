@@ -44,7 +44,7 @@ class ReferenceGround:
 
     Where to look comes from the detector's `reference` class, or from a box given for one frame; on frames without
     a detection the last box is followed. Which corner is which is settled by what a real camera could see, by the
-    box's `first_corner_px`, and then by the frame before. For a shape that can be turned onto itself (a square)
+    hint `first_corner_px`, and then by the frame before. For a shape that can be turned onto itself (a square)
     corner 0 starts as the one at the picture's bottom left.
 
     Args:
@@ -52,7 +52,8 @@ class ReferenceGround:
         params: Settings.
         box_xyxy_px: (4,) left, top, right, bottom of the reference in one frame; None: the detector finds it.
         box_time_s: Presentation timestamp of that frame; None: the first frame.
-        first_corner_px: (2,) about where corner 0 of the shape is in that frame; None: no hint.
+        first_corner_px: (2,) about where corner 0 of the shape is in that frame, or, without a box, where it is when
+            the detector first sees the reference; None: no hint.
         camera: Calibrated camera; its lens distortion is removed from edge points before lines are fitted.
 
     Raises:
@@ -318,11 +319,12 @@ def _checked_box(box_xyxy_px: Sequence[float] | FloatArray) -> FloatArray:
 
 def _checked_corner(first_corner_px: Sequence[float] | FloatArray, box: FloatArray | None) -> FloatArray:
     corner = np.array(first_corner_px, dtype=np.float64)
-    if box is None:
-        raise _box_error("a reference box together with first_corner_px", "first_corner_px alone")
-    slack = 0.2 * (box[2:] - box[:2])
-    if corner.shape != (2,) or not ((corner >= box[:2] - slack) & (corner <= box[2:] + slack)).all():
-        raise _box_error(f"first_corner_px x, y in the reference's box {box.tolist()}", f"{corner.tolist()}")
+    if corner.shape != (2,) or not np.isfinite(corner).all():
+        raise _box_error("first_corner_px x, y", f"{corner.tolist()}")
+    if box is not None:
+        slack = 0.2 * (box[2:] - box[:2])
+        if not ((corner >= box[:2] - slack) & (corner <= box[2:] + slack)).all():
+            raise _box_error(f"first_corner_px x, y in the reference's box {box.tolist()}", f"{corner.tolist()}")
     return corner
 
 

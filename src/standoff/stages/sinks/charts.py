@@ -23,7 +23,10 @@ from standoff.stages.sinks.ground_window import rectify, window_around
 from standoff.stages.sinks.palette import HEX, class_tone
 from standoff.stages.sinks.series import Path, Series
 
-_INK, _MUTED, _SURFACE = "#010203", "#040506", "#070809"  # stand-ins, replaced by the page's own colours
+INK, MUTED = "#010203", "#040506"
+"""Stand-ins for the colours of text and of what matters less, which `inline_svg` replaces by the page's own."""
+
+_SURFACE = "#070809"
 _FAINT_PAIRS = 20
 _PANELS = 6
 _PLAN_PX = 520
@@ -31,15 +34,15 @@ _STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",
     "font.family": "sans-serif",
     "font.size": 9.0,
-    "text.color": _INK,
-    "axes.edgecolor": _MUTED,
-    "axes.labelcolor": _INK,
+    "text.color": INK,
+    "axes.edgecolor": MUTED,
+    "axes.labelcolor": INK,
     "axes.facecolor": "none",
     "axes.spines.top": False,
     "axes.spines.right": False,
-    "xtick.color": _INK,
-    "ytick.color": _INK,
-    "grid.color": _MUTED,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "grid.color": MUTED,
     "grid.alpha": 0.3,
     "grid.linewidth": 0.6,
     "figure.facecolor": "none",
@@ -61,20 +64,40 @@ def clock(time_s: float, _position: object = None) -> str:
     return f"{int(minutes)}:{seconds:04.1f}"
 
 
+@contextmanager
+def themed_figure(width_in: float, height_in: float) -> Iterator[Figure]:
+    """Give a figure in the report's style; draw on it and call `inline_svg` before leaving."""
+    with mpl.rc_context(_STYLE):
+        yield Figure(figsize=(width_in, height_in), layout="constrained")
+
+
+def inline_svg(figure: Figure) -> str:
+    """Return the figure as an SVG element without prolog, links or fixed size, in the page's colours."""
+    text = io.StringIO()
+    FigureCanvasSVG(figure)
+    figure.savefig(text, format="svg", metadata={"Date": None})
+    svg = re.sub(r"<metadata>.*?</metadata>", "", text.getvalue(), flags=re.DOTALL)
+    head, body = svg[svg.index("<svg") :].split(">", 1)
+    svg = re.sub(r' (width|height|xmlns:xlink)="[^"]*"', "", head) + ">" + body.replace("xlink:href", "href")
+    for stand_in, name in ((INK, "--ink"), (MUTED, "--muted"), (_SURFACE, "--surface")):
+        svg = svg.replace(stand_in, f"var({name})")
+    return svg
+
+
 def site_chart(summary: RunSummary, warning_gap_m: float) -> str:
     """Draw the closest pair's gap over time, with the limits and with what was not measured."""
-    with _figure(10.0, 3.4) as figure:
+    with themed_figure(10.0, 3.4) as figure:
         axes = figure.add_subplot()
         for pair in summary.worst_pairs()[:_FAINT_PAIRS]:
             series = summary.pairs[pair]
-            axes.plot(series.column("time_s"), series.column("gap_m"), color=_MUTED, alpha=0.45, linewidth=0.7)
+            axes.plot(series.column("time_s"), series.column("gap_m"), color=MUTED, alpha=0.45, linewidth=0.7)
         _shade_unmeasured(axes, summary.site, summary.no_map)
         _plot_by_limit(axes, summary.site, "gap_m", 0.0, warning_gap_m)
         axes.set_ylabel("gap of the closest pair, m")
         highest = np.nanmax(summary.site.column("gap_m")) if summary.site.closest else 0.0
         axes.set_ylim(top=max(1.15 * highest, warning_gap_m + 8.0))
         _finish_time_axis(axes, summary)
-        return _svg(figure)
+        return inline_svg(figure)
 
 
 def pair_charts(summary: RunSummary, warning_gap_m: float) -> str:
@@ -83,20 +106,20 @@ def pair_charts(summary: RunSummary, warning_gap_m: float) -> str:
     if not worst:
         return ""
     rows = -(-len(worst) // 2)
-    with _figure(10.0, 2.1 * rows) as figure:
+    with themed_figure(10.0, 2.1 * rows) as figure:
         for i, pair in enumerate(worst):
             axes = figure.add_subplot(rows, 2, i + 1)
             series = summary.pairs[pair]
             time_s, distance, sigma = (series.column(name) for name in ("time_s", "distance_m", "sigma_m"))
             both_radii_m = float(np.nanmedian(distance - series.column("gap_m")))
-            axes.fill_between(time_s, distance - sigma, distance + sigma, color=_MUTED, alpha=0.35, linewidth=0)
+            axes.fill_between(time_s, distance - sigma, distance + sigma, color=MUTED, alpha=0.35, linewidth=0)
             _shade_unmeasured(axes, series, series)
             _plot_by_limit(axes, series, "distance_m", both_radii_m, both_radii_m + warning_gap_m)
             axes.set_title(" and ".join(summary.pair_names[pair]), loc="left", fontsize=9, fontweight="bold")
             axes.set_ylabel("distance, m")
             axes.set_ylim(bottom=0)
             _finish_time_axis(axes, summary)
-        return _svg(figure)
+        return inline_svg(figure)
 
 
 def plan_chart(summary: RunSummary) -> str:
@@ -106,7 +129,7 @@ def plan_chart(summary: RunSummary) -> str:
         return ""
     points = np.vstack([path.points_m for path in paths])
     low, high = _square_around(points[np.isfinite(points[:, 0])])
-    with _figure(7.2, 7.2) as figure:
+    with themed_figure(7.2, 7.2) as figure:
         axes = figure.add_subplot()
         background = _background(summary, low, high)
         if background is not None:
@@ -120,39 +143,20 @@ def plan_chart(summary: RunSummary) -> str:
         axes.set_xlabel("x, m")
         axes.set_ylabel("y, m")
         axes.grid(True)
-        return _svg(figure)
-
-
-@contextmanager
-def _figure(width_in: float, height_in: float) -> Iterator[Figure]:
-    with mpl.rc_context(_STYLE):
-        yield Figure(figsize=(width_in, height_in), layout="constrained")
-
-
-def _svg(figure: Figure) -> str:
-    """Return the figure as an SVG element without prolog, links or fixed size, in the page's colours."""
-    text = io.StringIO()
-    FigureCanvasSVG(figure)
-    figure.savefig(text, format="svg", metadata={"Date": None})
-    svg = re.sub(r"<metadata>.*?</metadata>", "", text.getvalue(), flags=re.DOTALL)
-    head, body = svg[svg.index("<svg") :].split(">", 1)
-    svg = re.sub(r' (width|height|xmlns:xlink)="[^"]*"', "", head) + ">" + body.replace("xlink:href", "href")
-    for stand_in, name in ((_INK, "--ink"), (_MUTED, "--muted"), (_SURFACE, "--surface")):
-        svg = svg.replace(stand_in, f"var({name})")
-    return svg
+        return inline_svg(figure)
 
 
 def _shade_unmeasured(axes: Axes, unmeasured: Series, no_map: Series) -> None:
     for start_s, end_s in unmeasured.unmeasured_spans_s():
-        axes.axvspan(start_s, end_s, facecolor=_MUTED, alpha=0.18, linewidth=0, zorder=0)
+        axes.axvspan(start_s, end_s, facecolor=MUTED, alpha=0.18, linewidth=0, zorder=0)
     for start_s, end_s in no_map.unmeasured_spans_s():
-        axes.axvspan(start_s, end_s, facecolor="none", edgecolor=_MUTED, alpha=0.6, hatch="////", linewidth=0, zorder=0)
+        axes.axvspan(start_s, end_s, facecolor="none", edgecolor=MUTED, alpha=0.6, hatch="////", linewidth=0, zorder=0)
 
 
 def _plot_by_limit(axes: Axes, series: Series, column: str, danger_m: float, warning_m: float) -> None:
     """Plot a curve in ink, in amber below the warning limit and in red below the danger limit."""
     time_s, value = series.column("time_s"), series.column(column)
-    axes.plot(time_s, value, color=_INK, linewidth=1.4)
+    axes.plot(time_s, value, color=INK, linewidth=1.4)
     for limit_m, tone in ((warning_m, HEX["warning"]), (danger_m, HEX["danger"])):
         axes.plot(time_s, np.where(value < limit_m, value, np.nan), color=tone, linewidth=2.0)
         axes.axhline(limit_m, color=tone, linewidth=0.9, linestyle=(0, (5, 3)))
