@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from standoff.core.errors import MissingDependency
+
 _PROJECT = Path(__file__).resolve().parent.parent
 
 
@@ -15,3 +17,17 @@ def shared_data() -> Path:
     if not folder.is_dir():
         pytest.skip(f"the shared data folder is not here ({folder}); set STANDOFF_SHARED_DATA")
     return folder
+
+
+@pytest.fixture(scope="session")
+def opengl() -> None:
+    """Skip where there is no OpenGL, except where CI says that there must be."""
+    from standoff.simulation.render import Renderer
+
+    try:
+        with Renderer((64, 64)):
+            pass
+    except MissingDependency as error:
+        if os.environ.get("STANDOFF_REQUIRE_EGL") == "1":
+            raise
+        pytest.skip(str(error))

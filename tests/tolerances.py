@@ -89,3 +89,6 @@ FOOTING_IN_PICTURE_PX = 0.1
 
 SCENE_DISTANCE_M = 1e-3
 """The clip's distances against the actors' own coordinates: what the issue asks; both are float64."""
+
+FLAT_BOX_POINT_M = 0.08
+"""A point of a flat 0.1 m square's box against the square's middle: half its diagonal, and a little for perspective."""

@@ -15,11 +15,17 @@ PUBLIC_NAMES = {
     "standoff.stages.locate": {"LocateParams", "Locator"},
     "standoff.stages.proximity": {"ProximityMeter", "ProximityParams", "side_classes"},
     "standoff.stages.hazard": {"HazardMonitor", "HazardParams"},
-}
+    "standoff.simulation.render": {"Look", "Rendered", "Renderer"},
+    "standoff.simulation.behaviour": {
+        "carrying_between", "crossing_behind", "digging", "dozing", "driving_through", "grading", "idle",
+        "keep_distance", "loader_loading", "near_miss", "pair_talking", "random_stance", "rolling", "spreading",
+        "standing_working", "truck_loading", "walking_past",
+    },
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("module", PUBLIC_NAMES)
-def test_a_stage_exports_what_is_written_down(module: str) -> None:
+def test_a_package_exports_what_is_written_down(module: str) -> None:
     assert set(importlib.import_module(module).__all__) == PUBLIC_NAMES[module]
 
 

@@ -37,6 +37,9 @@ def test_check_reads_the_files_that_the_settings_name(call: Call, site: Path, tm
         ("evaluate", "paper"),
         ("config",),
         ("bench",),
+        ("simulate",),
+        ("simulate", "mobile"),
+        ("simulate", "dataset"),
         ("doctor",),
     ],
 )

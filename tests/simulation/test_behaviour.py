@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from simulation.moving_models import MovingModel
 
-from standoff.core.classes import CLASS_BY_NAME
 from standoff.simulation import behaviour
 from standoff.simulation.behaviour.digging import RATES_PS
 from standoff.simulation.behaviour.encounters import least_distance_m
@@ -52,7 +51,6 @@ SCRIPTS: dict[str, tuple[tuple[MovingModel, ...], Script]] = {
         (TRUCK, WORKER), lambda rng: behaviour.crossing_behind(rng, TRUCK, WORKER, ORIGIN, DURATION_S)
     ),
     "near_miss": ((LOADER, WORKER), lambda rng: behaviour.near_miss(rng, LOADER, WORKER, ORIGIN, DURATION_S)),
-    "breach": ((WORKER,), lambda rng: behaviour.breach(rng, WORKER, EXCAVATOR.class_id, np.zeros(2), DURATION_S)),
 }  # fmt: skip
 RATES_OF_ALL = {**RATES_PS, "bucket_deg": 95.0, "lift_deg": 36.0, "bed_deg": 9.0, "blade_m": 0.5, "steer_deg": 25.5}
 
@@ -102,7 +100,7 @@ def test_the_same_generator_gives_the_same_motion(name: str) -> None:
     assert any(differs)
 
 
-@pytest.mark.parametrize("name", sorted(set(SCRIPTS) - {"driving_through", "walking_past", "breach"}))
+@pytest.mark.parametrize("name", sorted(set(SCRIPTS) - {"driving_through", "walking_past"}))
 def test_work_goes_on_for_the_whole_clip(name: str) -> None:
     for model, motion in _motions(name, 1):
         assert motion.time_s[0] <= 0.0 or name in ("crossing_behind", "near_miss")
@@ -178,15 +176,6 @@ def test_an_encounter_comes_as_close_as_stated_and_no_closer(
     time_s = np.arange(0.0, 13.0, 0.1)
     apart_m = [np.linalg.norm(sample(driven, t).xy_m - sample(walked, t).xy_m) for t in time_s.tolist()]
     assert min(apart_m) == pytest.approx(closest_m, abs=0.05)
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_a_breach_enters_the_action_radius_by_the_stated_share(seed: int) -> None:
-    radius_m = CLASS_BY_NAME["excavator"].action_radius_m
-    motion = behaviour.breach(np.random.default_rng(seed), WORKER, EXCAVATOR.class_id, np.array([4.0, 5.0]), 20.0)
-    apart_m = np.linalg.norm(motion.xy_m - [4.0, 5.0], axis=1)
-    assert apart_m.min() == pytest.approx(0.7 * radius_m, rel=1e-6)
-    assert min(apart_m[0], apart_m[-1]) > radius_m
 
 
 @pytest.mark.parametrize("kind", ["worker", "excavator", "wheel_loader", "dump_truck", "roller", "dozer", "vehicle"])

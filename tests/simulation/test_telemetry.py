@@ -11,10 +11,6 @@ from standoff.core.pose import View
 from standoff.simulation.flight import ShakenFlight, drone_camera, make_flight
 from standoff.simulation.presets import FlightStyle
 from standoff.simulation.telemetry import (
-    ALTITUDE_ERROR_M,
-    GIMBAL_ERROR_DEG,
-    HEADING_ERROR_DEG,
-    POSITION_ERROR_M,
     Origin,
     gimbal_angles_deg,
     write_telemetry,
@@ -30,6 +26,15 @@ BLOCK = re.compile(
     r"\[rel_alt: (?P<height>-?[\d.]+) abs_alt: (?P<altitude>-?[\d.]+)\] \[ct: \d+\] "
     r"\[gb_yaw: (?P<yaw>-?[\d.]+) gb_pitch: (?P<pitch>-?[\d.]+) gb_roll: (?P<roll>-?[\d.]+)\] </font>\n\n"
 )
+
+POSITION_ERROR_M = 2.2
+"""Largest horizontal error of a written position, quantisation included."""
+ALTITUDE_ERROR_M = 1.1
+"""Largest error of a written relative altitude."""
+GIMBAL_ERROR_DEG = 0.3
+"""Largest error of a written pitch or roll."""
+HEADING_ERROR_DEG = 3.3
+"""Largest error of a written yaw."""
 
 
 def _flight(style: FlightStyle, seed: int) -> ShakenFlight:

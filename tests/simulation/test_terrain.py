@@ -51,14 +51,13 @@ def surface_of(terrain: Terrain) -> trimesh.Trimesh:
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
-def test_heights_and_normals_are_those_of_the_triangles_split_from_south_west_to_north_east(seed: int) -> None:
+def test_heights_are_those_of_the_triangles_split_from_south_west_to_north_east(seed: int) -> None:
     terrain = small_terrain(seed)
     surface = surface_of(terrain)
     rng = np.random.default_rng(seed)
     weights = rng.dirichlet([1.0, 1.0, 1.0], len(surface.faces))
     points = (surface.triangles * weights[:, :, None]).sum(axis=1)
     np.testing.assert_allclose(terrain.height_at(points[:, :2]), points[:, 2], atol=1e-9)
-    np.testing.assert_allclose(terrain.normal_at(points[:, :2]), surface.face_normals, atol=1e-9)
 
 
 @settings(max_examples=50, deadline=None)
@@ -128,7 +127,7 @@ def test_a_pit_is_as_deep_as_planned_with_walls_steeper_than_sixty_degrees(seed:
     depth_m = terrain.height_at(around).mean() - terrain.height_at(inside).mean()
     assert depth_m == pytest.approx(2.0, abs=0.3)
     across = np.column_stack([np.linspace(-5.0, -3.0, 400), np.full(400, 5.0)])
-    steepness_deg = np.rad2deg(np.arccos(terrain.normal_at(across)[:, 2]))
+    steepness_deg = np.rad2deg(np.arctan(np.abs(np.diff(terrain.height_at(across)) / np.diff(across[:, 0]))))
     assert steepness_deg.max() > 60.0
 
 

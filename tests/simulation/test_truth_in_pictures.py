@@ -55,7 +55,7 @@ def test_projected_boxes_of_what_nothing_hides_are_those_of_the_id_picture(name:
     for row in shot.entities:
         full = np.array([row[f"full_{side}_px"] for side in _SIDES])
         inside = (full[:2] > 0).all() and full[2] < _WIDTH_PX - 1 and full[3] < _HEIGHT_PX - 1
-        if row["visible_share"] == 1.0 and inside:
+        if row["visible_share"] > 0.999 and inside:  # a weed may stand before the edge of a board of 25 m
             visible = np.array([row[f"{side}_px"] for side in _SIDES])
             np.testing.assert_allclose(visible, full, atol=VISIBLE_BOX_PX, err_msg=str(row))
             checked += 1

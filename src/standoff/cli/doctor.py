@@ -10,7 +10,10 @@ from typing import Annotated, Any, NamedTuple
 
 import typer
 
-_EXTRAS = {"train": ("torch", "onnx")}
+_EXTRAS = {
+    "train": ("torch", "onnx"),
+    "sim": ("moderngl", "trimesh", "pycollada", "shapely", "mapbox-earcut"),
+}
 _PROVIDERS = {
     "CPUExecutionProvider": "part of onnxruntime",
     "CUDAExecutionProvider": "pip install onnxruntime-gpu (in place of onnxruntime)",
@@ -102,9 +105,24 @@ def _encoders() -> list[Finding]:
     ]
 
 
+def _opengl() -> list[Finding]:
+    from standoff.core.errors import MissingDependency
+    from standoff.simulation.render.context import open_context
+
+    found, fix = "", ""
+    try:
+        context = open_context()
+    except MissingDependency as error:
+        fix = error.fix
+    else:
+        found = context.info["GL_RENDERER"]
+        context.release()
+    return [Finding("simulator", "OpenGL through EGL", found, needed=False, fix=fix)]
+
+
 def examine() -> list[Finding]:
-    """Look at packages, inference providers and video encoders."""
-    return [*_packages(), *_opencv_clash(), *_providers(), *_encoders()]
+    """Look at packages, inference providers, video encoders and OpenGL."""
+    return [*_packages(), *_opencv_clash(), *_providers(), *_encoders(), *_opengl()]
 
 
 def doctor(

@@ -47,37 +47,39 @@ def _print_rectification(results: Sequence[ClipResult]) -> None:
         for result in results if (score := result.rectification) is not None
     ]  # fmt: skip
     if rows:
-        columns = ("clip", "frames", "out of sight", "failed", "wrong", "corner rmse px", "within 5 px %")
+        columns = ("clip", "frames", "unseen", "failed", "wrong", "rmse px", "within %")
         caption = (
-            "Out of sight: no map, and a corner outside the picture or all of it hidden. Failed: no map otherwise, or a "
-            "wrong one: a corner more than 5 px off."
+            "Unseen: no map, and a corner outside the picture or all of it hidden. Failed: no map otherwise, or "
+            "a wrong one: a corner more than 5 px off. Rmse: of all others' corners."
         )
         print_table("Rectification", columns, rows, caption)
 
 
 def _print_distances(results: Sequence[ClipResult]) -> None:
-    from standoff.evaluation.paper.pairs import AFTER, BEFORE
     from standoff.evaluation.paper.captions import number_text
+    from standoff.evaluation.paper.pairs import AFTER, BEFORE
 
     rows = []
     for result in results:
-        for group in result.groups:
+        for index, group in enumerate(result.groups):
             before, after = group.scores[BEFORE], group.scores[AFTER]
-            numbers = (
-                number_text(before.made_m, "m"), number_text(after.made_m, "m"), number_text(after.mape_percent, "%"),
-                number_text(after.median_m, "m"),
-            )  # fmt: skip
-            pair = group.class_pair.replace("_", " ") + (f" x {group.pairs}" if group.pairs > 1 else "")
-            rows.append((result.clip.name, pair, f"{after.measured} of {after.frames}", *numbers))
+            _, _, machine = group.class_pair.replace("_", " ").partition("-")
+            pair = machine + (f" x{group.pairs}" if group.pairs > 1 else "")
+            numbers = (before.made_m, after.made_m, after.mape_percent, after.median_m)
+            name = "" if index else result.clip.name
+            rows.append((name, pair, f"{after.measured}/{after.frames}", *map(number_text, numbers)))
     if rows:
-        columns = ("clip", "pairs", "measured", "MADE before", "MADE after", "MAPE after", "median after")
-        caption = "Against exact truth, before and after the outlier filter; measured: frames of all pairs of the kind."
-        print_table("Distances", columns, rows, caption, texts=2)
+        columns = ("clip", "machine", "measured", "before", "after", "after %", "median")
+        caption = (
+            "Against exact truth, m: MADE before and after the outlier filter, MAPE (%) and median residual after it. "
+            "Measured: of the frames of all pairs of the kind."
+        )
+        print_table("Distances of workers from machines", columns, rows, caption, texts=2)
 
 
 def _print_benchmark(results: Sequence[ClipResult]) -> None:
-    from standoff.evaluation.paper.pairs import BENCHMARK
     from standoff.evaluation.paper.captions import number_text
+    from standoff.evaluation.paper.pairs import BENCHMARK
 
     rows = [
         (result.clip.name, group.class_pair.replace("_", " "), f"{score.measured} of {score.frames}",

@@ -11,7 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from standoff.core.homography import FloatArray
-from standoff.simulation.mesh import Colour, Mesh, Surface
+from standoff.simulation.mesh import Colour, Mesh, Surface, grid_faces
+from standoff.simulation.panels import panels
 
 
 def bars(
@@ -37,22 +38,7 @@ def bars(
     offset = corners[None, :, 0, None] * side[:, None] + corners[None, :, 1, None] * over[:, None]
     ring = ends[:, :, None] + offset[:, None]
     faces = np.stack([ring[:, 0], ring[:, 1], np.roll(ring[:, 1], -1, axis=1), np.roll(ring[:, 0], -1, axis=1)], axis=2)
-    normals = np.stack([over, -side, -over, side], axis=1)
-    return quads(faces.reshape(-1, 4, 3), normals.reshape(-1, 3), colour, surface)
-
-
-def quads(corners_m: FloatArray, normals: FloatArray, colour: Colour | None, surface: Surface) -> Mesh:
-    """Return flat quadrilaterals: (N, 4, 3) corners, counter-clockwise from outside, and (N, 3) normals."""
-    count = len(corners_m)
-    first = 4 * np.arange(count)[:, None]
-    return Mesh(
-        corners_m.reshape(-1, 3).astype(np.float32),
-        np.repeat(normals, 4, axis=0).astype(np.float32),
-        np.tile(np.array(colour or (1.0, 1.0, 1.0), dtype=np.float32), (4 * count, 1)),
-        np.full(4 * count, colour is None, dtype=np.float32),
-        np.full(4 * count, surface, dtype=np.uint8),
-        (first + np.array([0, 1, 2, 0, 2, 3])).reshape(-1, 3).astype(np.uint32),
-    )
+    return panels(faces, colour, surface)
 
 
 def grid(points_m: FloatArray, colour: Colour | None, surface: Surface, *, shade: FloatArray | None = None) -> Mesh:
@@ -70,9 +56,6 @@ def grid(points_m: FloatArray, colour: Colour | None, surface: Surface, *, shade
     points = np.asarray(points_m, dtype=np.float64)
     rows, columns = points.shape[:2]
     normals = _unit(np.cross(np.gradient(points, axis=1), np.gradient(points, axis=0)))
-    index = np.arange(rows * columns).reshape(rows, columns)
-    corner = [index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]]
-    triangles = np.stack([np.stack([corner[0], corner[k], corner[k + 1]], axis=-1) for k in (1, 2)], axis=-2)
     albedo = np.tile(np.array(colour or (1.0, 1.0, 1.0), dtype=np.float64), (rows, columns, 1))
     if shade is not None:
         albedo = albedo * (shade if shade.ndim == 3 else shade[..., None])
@@ -82,7 +65,7 @@ def grid(points_m: FloatArray, colour: Colour | None, surface: Surface, *, shade
         albedo.reshape(-1, 3).astype(np.float32),
         np.full(rows * columns, colour is None, dtype=np.float32),
         np.full(rows * columns, surface, dtype=np.uint8),
-        triangles.reshape(-1, 3).astype(np.uint32),
+        grid_faces(rows, columns)[:, ::-1].astype(np.uint32),
     )
 
 

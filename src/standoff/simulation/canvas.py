@@ -86,11 +86,6 @@ class Canvas:
         return slice(low[1], high[1]), slice(low[0], high[0])
 
 
-def enlarge(field: Float32Array | Picture, shape: tuple[int, int]) -> npt.NDArray[np.generic]:
-    """Return a field in another size, smoothly."""
-    return np.asarray(cv2.resize(field, shape[::-1], interpolation=cv2.INTER_LINEAR))
-
-
 def fractal(
     rng: np.random.Generator, shape: tuple[int, int], coarsest: int, finest: int, gain: float = 0.6
 ) -> Float32Array:

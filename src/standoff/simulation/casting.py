@@ -115,14 +115,12 @@ def swept(model: Model, motion: Motion) -> shapely.Geometry:
     before: shapely.Polygon | None = None
     for time_s in np.arange(0.0, motion.time_s[-1] + _SWEEP_STEP_S, _SWEEP_STEP_S):
         placement = sample(motion, float(time_s))
-        cosine, sine = np.cos(placement.heading_rad), np.sin(placement.heading_rad)
-        turn = np.array([[cosine, -sine], [sine, cosine]])
-        outline = shapely.Polygon(model.footprint_m @ turn.T + placement.xy_m)
+        outline = shapely.Polygon(placement.to_site(model.footprint_m))
         shapes.append(shapely.union(before or outline, outline).convex_hull)
         before = outline
         tip_m = model.tool_tip_m(placement.joints)
         if tip_m is not None:
-            shapes.append(shapely.Point(turn @ tip_m[:2] + placement.xy_m).buffer(_TOOL_RADIUS_M, quad_segs=3))
+            shapes.append(shapely.Point(placement.to_site(tip_m[:2])).buffer(_TOOL_RADIUS_M, quad_segs=3))
     return shapely.union_all(shapes).buffer(0.1).simplify(0.05)
 
 

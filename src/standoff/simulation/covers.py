@@ -10,27 +10,15 @@ import numpy as np
 
 from standoff.core.errors import ConfigError
 from standoff.core.homography import FloatArray
-from standoff.simulation.mesh import Mesh, Surface, join, rotation, srgb, translation
-from standoff.simulation.props.materials import (
-    BARE_STEEL,
-    SANDS,
-    SOILS,
-    WOODS,
-    block,
-    mound,
-    relief,
-    ripples,
-    tints,
-    toned,
-)
+from standoff.simulation.mesh import Mesh, Surface, join, rotation, srgb, toned, translation
+from standoff.simulation.props.materials import BARE_STEEL, SANDS, SOILS, WOODS, block, mound, relief, ripples, tints
 from standoff.simulation.scene import Cover, Ground, Reference, place
 
 _TARPAULINS = tuple(srgb(code) for code in ("#2f5f8f", "#4d6b4a", "#8a8c8a", "#3b3c3e"))
 _STEEPNESS = 0.6
 """Height over run of sand that has come to rest: 31 degrees."""
-
-
 _SIDE_LOADS = 6
+"""Heaps from corner to corner, so close that they merge into one bank."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,7 +144,7 @@ def _make_sand_side(rng: np.random.Generator, bed: _Bed) -> Laid:
     start_m, stop_m = bed.corners_m[number], bed.corners_m[(number + 1) % 4]
     loads = [_heap_on(rng, bed, start_m + share * (stop_m - start_m)) for share in np.linspace(0.0, 1.0, _SIDE_LOADS)]
     middle_m = bed.middle_of_edge(number)
-    heaps = [heap.at(*(spot_m - middle_m).tolist(), 0.0) for spot_m, heap, _ in loads]
+    heaps = [heap.at(float(spot_m[0] - middle_m[0]), float(spot_m[1] - middle_m[1]), 0.0) for spot_m, heap, _ in loads]
     return middle_m, join(heaps), loads[0][2]
 
 

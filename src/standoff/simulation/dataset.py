@@ -18,21 +18,26 @@ from standoff.core.classes import CLASSES
 from standoff.simulation.coco import Annotations
 from standoff.simulation.covers import COVER_KINDS
 from standoff.simulation.crew import work_through
-from standoff.simulation.flight import Still, drone_camera
 from standoff.simulation.moment import scene_at
 from standoff.simulation.output import whole_folder
 from standoff.simulation.presets import MAX_SEED, Condition, CoverPlan, Plan, Preset, check_seed, check_size
+from standoff.simulation.render import Look
+from standoff.simulation.scene import Scene
 from standoff.simulation.site import Site, build_site
 from standoff.simulation.site_plans import SiteStyle
 from standoff.simulation.studio import Studio
 from standoff.simulation.truth import Row
+from standoff.simulation.viewpoints import Obstacles, draw_flight, draw_view
 
 SPLITS = ("train", "val", "test")
-_SCENE_FRAMES = 360
+_SCENE_FRAMES = 240
+_SHUTTERS_S = (0.0, 0.0, 1 / 240, 1 / 100)
+"""Least exposure times: how much a passing drone smears its pictures."""
 _CONDITION_SHARES = (0.22, 0.26, 0.12, 0.12, 0.22, 0.06)
-_MIN_VISIBLE_PX = 12
+_MIN_VISIBLE_PX, _MIN_SIDE_PX = 16, 6
 _MIN_VISIBLE_SHARE = 0.15
-"""What shows less than this is left unmarked: a person who marks pictures would not see it."""
+_PLAIN_PX = 1500
+"""Of a machine is plain to see, however small a share of it that is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,10 +190,16 @@ def open_scene_shooter(plan: DatasetPlan) -> Generator[Callable[[int], list[Pict
         nonlocal studio
         rng = np.random.default_rng([plan.seed, 49979687, scene])
         site = build_site(_draw_plan(rng, plan))
+        site = replace(site, scene=_thin_street(rng, site.scene))
+        obstacles = Obstacles.of(site.scene.props)
         if studio is None:
             studio = Studio(site)
-        count = min(plan.per_scene, plan.images - scene * plan.per_scene)
-        return [_shoot(studio, site, plan, rng, scene, index) for index in range(count)]
+        pictures = []
+        for index in range(min(plan.per_scene, plan.images - scene * plan.per_scene)):
+            jpeg, entities = _shoot(studio, site, obstacles, rng, index)
+            name = f"{plan.seed}-{scene:05d}-{index:02d}.jpg"
+            pictures.append(Picture(name, jpeg, (plan.width_px, plan.height_px), entities, scene))
+        return pictures
 
     try:
         yield shoot
@@ -221,34 +232,47 @@ def _draw_plan(rng: np.random.Generator, plan: DatasetPlan) -> Plan:
     return Plan("dataset", preset, int(rng.integers(MAX_SEED)), excavator_mesh=mesh)
 
 
-def _shoot(studio: Studio, site: Site, plan: DatasetPlan, rng: np.random.Generator, scene: int, index: int) -> Picture:
-    time_s = rng.uniform(0.0, site.duration_s)
-    flight = _look_at_somebody(site, plan, rng, time_s)
-    studio.show(replace(site, scene=replace(site.scene, flight=flight)))
+def _thin_street(rng: np.random.Generator, scene: Scene) -> Scene:
+    """Keep some of the parked vehicles: streets full of them would be most of what a detector learns from."""
+    share = rng.uniform(0.0, 0.5) ** 2
+    gone = {id(vehicle) for vehicle in scene.parked if rng.random() > share}
+    props = tuple(batch for batch in scene.props if id(batch) not in gone)
+    return replace(scene, props=props, parked=tuple(batch for batch in scene.parked if id(batch) not in gone))
+
+
+def _shoot(
+    studio: Studio, site: Site, obstacles: Obstacles, rng: np.random.Generator, index: int
+) -> tuple[bytes, list[Row]]:
+    """Return one picture as JPEG, and who is marked in it."""
+    time_s = float(rng.uniform(0.0, site.duration_s))
+    size_px = (site.camera.width_px, site.camera.height_px)
+    view = draw_view(rng, size_px, scene_at(site.scene, time_s).bodies, obstacles)
+    shutter_s = float(rng.choice(_SHUTTERS_S))
+    scene = replace(site.scene, flight=draw_flight(rng, view, time_s))
+    studio.show(replace(site, scene=scene, look=_vary(rng, site.look), shutter_s=max(site.shutter_s, shutter_s)))
     shot = studio.shoot(index, time_s)
-    quality = int(rng.choice([60, 75, 85, 92, 95]))
+    quality = int(rng.choice([50, 65, 75, 85, 92, 95]))
     coded, jpeg = cv2.imencode(".jpg", shot.image, [cv2.IMWRITE_JPEG_QUALITY, quality])
     assert coded
-    seen = [
-        row
-        for row in shot.entities
-        if row["visible_px"] >= _MIN_VISIBLE_PX and row["visible_share"] >= _MIN_VISIBLE_SHARE
-    ]
-    name = f"{plan.seed}-{scene:05d}-{index:02d}.jpg"
-    return Picture(name, jpeg.tobytes(), (plan.width_px, plan.height_px), seen, scene)
+    return jpeg.tobytes(), [row for row in shot.entities if is_marked(row)]
 
 
-def _look_at_somebody(site: Site, plan: DatasetPlan, rng: np.random.Generator, time_s: float) -> Still:
-    """Put the camera where one of the actors is in the picture, from any height and side."""
-    bodies = scene_at(site.scene, time_s).bodies
-    target = bodies[rng.integers(len(bodies))].centre_m if bodies else np.zeros(3)
-    camera = drone_camera(plan.width_px, plan.height_px, float(rng.uniform(45.0, 84.0)), rng)
-    low_deg, high_deg = ((20.0, 45.0), (45.0, 75.0), (75.0, 90.0))[int(rng.choice(3, p=[0.4, 0.4, 0.2]))]
-    return Still.over(
-        camera,
-        target[:2] + rng.normal(0.0, 4.0, 2),
-        altitude_m=float(15.0 * 4.0 ** rng.beta(1.0, 1.6)),
-        pitch_deg=float(rng.uniform(low_deg, high_deg)),
-        heading_deg=float(rng.uniform(0.0, 360.0)),
-        roll_deg=float(rng.normal(0.0, 1.0)),
+def _vary(rng: np.random.Generator, look: Look) -> Look:
+    """Develop one picture of a scene otherwise than the next: exposure, tone, colour, glare."""
+    red, green, blue = look.white_balance
+    return replace(
+        look,
+        exposure=look.exposure * float(2.0 ** np.clip(rng.normal(0.0, 0.3), -0.6, 0.6)),
+        contrast=look.contrast * float(rng.uniform(0.95, 1.3)),
+        lift=look.lift + float(min(rng.exponential(0.003), 0.03)),
+        saturation=look.saturation * float(rng.uniform(0.9, 1.35)),
+        white_balance=(red * float(rng.normal(1.0, 0.03)), green, blue * float(rng.normal(1.0, 0.04))),
     )
+
+
+def is_marked(row: Row) -> bool:
+    """Return whether somebody who marks pictures would mark an entity; the rest is too small or too hidden."""
+    side_px = max(row["x2_px"] - row["x1_px"], row["y2_px"] - row["y1_px"])
+    if row["visible_px"] < _MIN_VISIBLE_PX or side_px < _MIN_SIDE_PX:
+        return False
+    return bool(row["visible_share"] >= _MIN_VISIBLE_SHARE or row["visible_px"] >= _PLAIN_PX)

@@ -1,4 +1,4 @@
-"""Loose material in a skip, on a truck's bed or beside a wall: a bumpy skin and lumps that stick out of it."""
+"""Loose material in a skip, on a truck's bed, in a bucket: a bumpy skin and lumps that stick out of it."""
 
 from __future__ import annotations
 
@@ -36,6 +36,16 @@ def heap(
     skin = grid(points, None, Surface.SOIL, shade=mixed)
     skin.tintable[:] = 0.0
     return join([skin, *(_lump(rng, points, size_m, colours) for _ in range(lumps))])
+
+
+def soil_heap(length_m: float, width_m: float, height_m: float, colour: Colour | None, *, seed: int = 0) -> Mesh:
+    """Return a bucket's load: soil heaped on z = 0 over a rectangle centred in x and y."""
+    rng = np.random.default_rng(seed)
+    share = np.linspace(-1.0, 1.0, 9)
+    x, y = np.meshgrid(share, share)
+    rise = np.sqrt(np.clip((1.0 - x**4) * (1.0 - y**4), 0.0, 1.0))
+    height = height_m * rise * rng.uniform(0.72, 1.0, x.shape)
+    return grid(np.stack([x * length_m / 2, y * width_m / 2, height], axis=-1), colour, Surface.SOIL)
 
 
 def _lump(

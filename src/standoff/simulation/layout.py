@@ -15,7 +15,7 @@ import numpy.typing as npt
 import shapely
 
 from standoff.core.homography import FloatArray
-from standoff.simulation.mesh import Mesh
+from standoff.simulation.mesh import Mesh, rotated_xy
 from standoff.simulation.props.prop import Prop
 from standoff.simulation.scene import Batch, Ground
 
@@ -280,8 +280,7 @@ def _bounds(batches: Sequence[Batch]) -> tuple[FloatArray, FloatArray, float]:
 
 
 def _turned(local_m: FloatArray, spot: _Spot) -> FloatArray:
-    cosine, sine = np.cos(spot.turn_rad), np.sin(spot.turn_rad)
-    return np.asarray(local_m @ np.array([[cosine, sine], [-sine, cosine]]) + spot.xy_m)
+    return rotated_xy(local_m, spot.turn_rad) + spot.xy_m
 
 
 def _stand(spot: _Spot, corners_m: FloatArray, top_m: float, ground: Ground) -> FloatArray | None:

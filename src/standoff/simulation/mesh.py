@@ -123,6 +123,23 @@ def join(meshes: Sequence[Mesh]) -> Mesh:
     )
 
 
+def toned(mesh: Mesh, tone: float | FloatArray) -> Mesh:
+    """Return the mesh lighter or darker by a factor, one for all or (V,); tinting still works on top of it."""
+    factor = np.asarray(tone, dtype=np.float32).reshape(-1, 1)
+    return replace(mesh, albedo=np.clip(mesh.albedo * factor, 0.0, 1.0 if mesh.tintable.any() else 0.85))
+
+
+def grid_faces(rows: int, columns: int) -> npt.NDArray[np.int64]:
+    """Return (T, 3) triangles over a grid of points numbered row by row, turning from rows to columns.
+
+    >>> grid_faces(2, 2).tolist()
+    [[0, 2, 3], [0, 3, 1]]
+    """
+    index = np.arange(rows * columns).reshape(rows, columns)
+    a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
+    return np.stack([a, b, c, a, c, d], axis=-1).reshape(-1, 3)
+
+
 def translation(x_m: float, y_m: float, z_m: float) -> FloatArray:
     """Return the (4, 4) pose of an offset."""
     pose = np.eye(4)
@@ -142,6 +159,17 @@ def rotation(axis: str, angle_deg: float) -> FloatArray:
     pose[first, first] = pose[second, second] = cosine
     pose[first, second], pose[second, first] = -sine, sine
     return pose
+
+
+def rotated_xy(points_m: FloatArray, angle_rad: float) -> FloatArray:
+    """Return (..., 2) points turned counter-clockwise about the origin.
+
+    >>> rotated_xy(np.array([[2.0, 0.0]]), np.pi / 2).round(6).tolist()
+    [[0.0, 2.0]]
+    """
+    cosine, sine = np.cos(angle_rad), np.sin(angle_rad)
+    turned: FloatArray = np.asarray(points_m) @ np.array([[cosine, sine], [-sine, cosine]])
+    return turned
 
 
 def scaling(x: float, y: float, z: float) -> FloatArray:

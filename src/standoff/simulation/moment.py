@@ -11,8 +11,7 @@ from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.homography import FloatArray
 from standoff.core.pose import View
 from standoff.simulation.motion import Placement, place_on_ground, sample
-from standoff.simulation.props.prop import moved
-from standoff.simulation.scene import CARRIED, NOTHING, Actor, Batch, Cover, Ground, Reference, Scene
+from standoff.simulation.scene import CARRIED, NOTHING, Actor, Batch, Cover, Ground, Reference, Scene, moved
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from standoff.core.homography import FloatArray
+from standoff.simulation.mesh import rotated_xy, rotation
 from standoff.simulation.scene import Ground, Model, Motion
 
 STEP_S = 0.02
@@ -70,6 +71,10 @@ class Placement:
     velocity_mps: FloatArray
     joints: Mapping[str, float]
 
+    def to_site(self, points_m: FloatArray) -> FloatArray:
+        """Return (..., 2) points of the local frame in the site frame."""
+        return rotated_xy(points_m, self.heading_rad) + self.xy_m
+
 
 def wrapped(angle_rad: float) -> float:
     """Return the same direction within -pi .. pi.
@@ -120,15 +125,14 @@ def place_on_ground(placement: Placement, footprint_m: FloatArray, ground: Groun
     Returns:
         (4, 4) local to site; its origin is exactly at the placement's x and y.
     """
-    cosine, sine = np.cos(placement.heading_rad), np.sin(placement.heading_rad)
-    yaw = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+    yaw = rotation("z", float(np.rad2deg(placement.heading_rad)))[:3, :3]
     pose = np.eye(4)
     pose[:2, 3] = placement.xy_m
     if np.ptp(footprint_m, axis=0).max() < _UPRIGHT_BELOW_M:
         pose[:3, :3] = yaw
         pose[2, 3] = ground.height_at(placement.xy_m[None])[0]
         return pose
-    heights_m = ground.height_at(footprint_m @ yaw[:2, :2].T + placement.xy_m)
+    heights_m = ground.height_at(placement.to_site(footprint_m))
     plane = np.column_stack([np.ones(len(footprint_m)), footprint_m])
     pose[2, 3], ahead, left = np.linalg.lstsq(plane, heights_m, rcond=None)[0]
     forward = np.array([1.0, 0.0, ahead]) / np.hypot(1.0, ahead)

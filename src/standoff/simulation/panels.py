@@ -1,4 +1,4 @@
-"""Meshes from loose flat rectangles: facades, roofs, streets, leaves."""
+"""Meshes from loose flat quadrilaterals: facades, roofs, streets, leaves, the sides of bars."""
 
 from __future__ import annotations
 
@@ -9,27 +9,29 @@ from standoff.simulation.mesh import Colour, Mesh, Surface
 
 
 def panels(
-    corners_m: FloatArray, colour: Colour | FloatArray, surface: Surface = Surface.CONCRETE, tintable: float = 0.0
-) -> Mesh:
-    """Return flat rectangles, each seen from one side.
+    corners_m: FloatArray, colour: Colour | FloatArray | None, surface: Surface = Surface.CONCRETE,
+    tintable: float = 0.0,
+) -> Mesh:  # fmt: skip
+    """Return flat quadrilaterals, each seen from one side.
 
     Args:
         corners_m: (N, 4, 3), counter-clockwise from outside; two corners may fall together.
-        colour: Linear albedo of all, or (N, 3).
+        colour: Linear albedo of all, or (N, 3); None: the tint alone.
         surface: Of all.
-        tintable: Of all.
+        tintable: Of all that have a colour.
     """
     corners = np.asarray(corners_m, dtype=np.float64).reshape(-1, 4, 3)
     normals = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     first = 4 * np.arange(len(corners), dtype=np.uint32)[:, None, None]
     triangles = (first + np.array([[[0, 1, 2], [0, 2, 3]]], dtype=np.uint32)).reshape(-1, 3)
-    colours = np.broadcast_to(np.asarray(colour, dtype=np.float32), (len(corners), 3))
+    own = (1.0, 1.0, 1.0) if colour is None else colour
+    colours = np.broadcast_to(np.asarray(own, dtype=np.float32), (len(corners), 3))
     return Mesh(
         corners.reshape(-1, 3).astype(np.float32),
         np.repeat(normals, 4, axis=0).astype(np.float32),
         np.repeat(colours, 4, axis=0).astype(np.float32),
-        np.full(4 * len(corners), tintable, dtype=np.float32),
+        np.full(4 * len(corners), 1.0 if colour is None else tintable, dtype=np.float32),
         np.full(4 * len(corners), surface, dtype=np.uint8),
         triangles,
     )

@@ -91,7 +91,7 @@ PRESETS: Mapping[str, Preset] = MappingProxyType(
         "stationary-15": Preset(
             "The paper's stationary test: worker and excavator exactly 15 m apart, quadrilateral footing, hand-held.",
             "stationary-15", frames=50, motion="hand", shape="quadrilateral_footing", style="foundations",
-            soil="brown earth", condition="hazy",
+            soil="brown earth", condition="overcast",
         ),
         "stationary-20": Preset(
             "The same, exactly 20 m apart.",

@@ -13,9 +13,9 @@ import numpy as np
 
 from standoff.core.errors import ConfigError
 from standoff.core.homography import FloatArray
-from standoff.simulation.bars import quads
-from standoff.simulation.mesh import Colour, Mesh, Surface, box, join, rotation, srgb, translation
-from standoff.simulation.props.materials import block, relief, toned
+from standoff.simulation.mesh import Colour, Mesh, Surface, box, join, rotation, srgb, toned, translation
+from standoff.simulation.panels import panels
+from standoff.simulation.props.materials import block, relief
 from standoff.simulation.props.rebar import starters
 from standoff.simulation.scene import Ground, Reference, place
 
@@ -180,10 +180,9 @@ def _make_board(rng: np.random.Generator, worn: bool) -> Made:
     nodes = np.concatenate([nodes, np.full((*nodes.shape[:2], 1), _BOARD_THICKNESS_M)], axis=-1)
     squares = np.stack([nodes[:-1, :-1], nodes[1:, :-1], nodes[1:, 1:], nodes[:-1, 1:]], axis=2)
     odd = np.indices((BOARD_SQUARES, BOARD_SQUARES)).sum(axis=0) % 2 == 1
-    up = np.array([0.0, 0.0, 1.0])
     painted = []
     for chosen, colour in ((odd, _WHITE), (~odd, _BLACK)):
-        mesh = quads(squares[chosen], np.tile(up, (int(chosen.sum()), 1)), colour, Surface.PAINT)
+        mesh = panels(squares[chosen], colour, Surface.PAINT)
         tones = rng.uniform(0.9, 1.0, int(chosen.sum())) if worn else np.ones(int(chosen.sum()))
         painted.append(toned(mesh, np.repeat(tones, 4)))
     under = box((BOARD_M, BOARD_M, _ROOT_M), _BLACK, Surface.PAINT).at(0.0, 0.0, _BOARD_THICKNESS_M - 0.004 - _ROOT_M)

@@ -5,8 +5,8 @@ Everything is a function of the scene's time: any frame can be rendered alone, a
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -60,6 +60,11 @@ def place(
         np.ascontiguousarray(np.broadcast_to(np.asarray(dust, dtype=np.float32), (count,))),
         entity_id,
     )
+
+
+def moved(batches: Sequence[Batch], pose: FloatArray) -> tuple[Batch, ...]:
+    """Return the batches through a (4, 4) pose: from the local frame of a prop or model to where it stands."""
+    return tuple(replace(batch, poses=np.asarray(pose @ batch.poses, dtype=np.float32)) for batch in batches)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

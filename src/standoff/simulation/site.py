@@ -78,7 +78,8 @@ def build_site(plan: Plan) -> Site:
     heading_deg = float(rng["flight"].uniform(0.0, 360.0))
     duration_s = plan.duration_s * 1.3 + 1.0  # a variable rate takes longer than the nominal one
     scale = max(1.0, preset.altitude_m / 25.0)
-    stage = Stage(heading_deg, scale, duration_s, plan.excavator_mesh, preset.reference_offset_m)
+    reference_m = None if preset.shape is None else preset.reference_offset_m
+    stage = Stage(heading_deg, scale, duration_s, plan.excavator_mesh, reference_m)
     cast = CASTS[preset.cast](rng["cast"], stage)
     flight = make_flight(
         rng["flight"], preset.motion, camera, target_xy_m=np.zeros(2), altitude_m=preset.altitude_m,

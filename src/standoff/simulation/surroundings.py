@@ -15,6 +15,7 @@ from standoff.core.homography import FloatArray
 from standoff.simulation.buildings import COTTAGES, FLATS, SHEDS, WALLS, House, building, scaffolding
 from standoff.simulation.mesh import Colour, Mesh, Surface, rotation, scaling, srgb, translation
 from standoff.simulation.outskirts import CAR_VARIANTS, STREET_VARIANTS, lay_land, lay_street, parked_car
+from standoff.simulation.props.materials import aged
 from standoff.simulation.scene import NOTHING, PARKED, Batch, place
 from standoff.simulation.terrain import Terrain
 from standoff.simulation.vegetation import (
@@ -294,4 +295,5 @@ def _stand(town: _Town, plant: Mesh, at_m: FloatArray, size: float) -> None:
 
 def _vary(rng: np.random.Generator, tints: Sequence[Colour]) -> FloatArray:
     """Return one of the tints, a little lighter or darker."""
-    return np.array(tints[int(rng.integers(len(tints)))]) * rng.uniform(0.8, 1.15)
+    (tint,) = aged(rng, tints, (0.8, 1.15))
+    return np.asarray(tint)

@@ -20,15 +20,6 @@ _EQUATOR_M, _FLATTENING = 6_378_137.0, 1 / 298.257223563  # WGS84
 _DRIFT_BAND_HZ = (0.002, 0.02)  # what GPS and barometer wander by within minutes
 _FULL_FRAME_WIDTH_MM = 36.0
 
-POSITION_ERROR_M = 2.2
-"""Largest horizontal error of a written position, quantisation included."""
-ALTITUDE_ERROR_M = 1.1
-"""Largest error of a written relative altitude."""
-GIMBAL_ERROR_DEG = 0.3
-"""Largest error of a written pitch or roll."""
-HEADING_ERROR_DEG = 3.3
-"""Largest error of a written yaw."""
-
 
 @dataclass(frozen=True, slots=True)
 class Origin:

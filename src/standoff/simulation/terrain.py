@@ -51,13 +51,6 @@ class Terrain:
         height, east, north, across, up = self._plane(xy_m)
         return height + east * across + north * up
 
-    def normal_at(self, xy_m: FloatArray) -> FloatArray:
-        """Return (N, 3) unit normals, upwards, of the triangles under (N, 2)."""
-        _, _, _, across, up = self._plane(xy_m)
-        normal = np.column_stack([-across / self.cell_m, -up / self.cell_m, np.ones(len(across))])
-        unit: FloatArray = normal / np.linalg.norm(normal, axis=1, keepdims=True)
-        return unit
-
     def _plane(self, xy_m: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
         """Return, for each point, its cell's south-west height, its place in the cell, and the rise across a cell."""
         place = (np.asarray(xy_m, dtype=np.float64).reshape(-1, 2) - self.origin_xy_m) / self.cell_m

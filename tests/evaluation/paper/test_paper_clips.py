@@ -17,6 +17,7 @@ from standoff.core.errors import DataError
 from standoff.core.types import Detections, Frame
 from standoff.evaluation.paper import BoxError, Clip, Trial, evaluate_clip, load_clip
 from standoff.evaluation.paper.localisation import true_scale_m_per_px
+from standoff.evaluation.paper.trial import settings_for
 from standoff.evaluation.paper.truth_detector import REFERENCE_MARGIN_PX, TrueBoxes
 from standoff.evaluation.paper.turning import Turning
 from standoff.evaluation.paper.watch import NOT_DETECTED, NOT_VISIBLE, open_clip_video
@@ -92,6 +93,40 @@ def test_truth_of_another_length_than_the_video_is_refused(copy_of: Path) -> Non
     drawn_clip.write_tables(copy_of, frames=drawn_clip.FRAMES - 2)
     with pytest.raises(DataError, match=f"{drawn_clip.FRAMES - 2} frames .* found {drawn_clip.FRAMES}"):
         open_clip_video(load_clip(copy_of))
+
+
+def test_a_reference_that_is_not_whole_in_the_picture_is_counted_apart(clip_folder: Path) -> None:
+    clip = load_clip(clip_folder)
+    reference = clip.reference
+    assert reference is not None
+    away = replace(reference, corners_px=reference.corners_px.copy())
+    hidden = drawn_clip.HIDDEN[0]
+    away.corners_px[hidden, 2, 0] = 1e4
+    for known, out_of_sight in ((reference, 0), (away, 1)):
+        score = evaluate_clip(replace(clip, reference=known), Trial(method="oriented")).rectification
+        assert score is not None
+        assert score.out_of_sight == out_of_sight
+        assert score.failed == len(drawn_clip.HIDDEN) - out_of_sight
+
+
+def test_which_corner_is_which_is_told(clip_folder: Path) -> None:
+    clip = load_clip(clip_folder)
+    assert clip.reference is not None
+    settings = settings_for(clip, Trial())
+    assert settings.ground.reference is not None
+    first_m = settings.ground.reference.shape().corners_m[0]
+    expected = drawn_clip.seen_px(0, first_m[None])[0]
+    assert settings.ground.reference.first_corner_px == pytest.approx(expected.tolist())
+    unseen = replace(clip, reference_box_px=np.full_like(clip.reference_box_px, np.nan))
+    reference = settings_for(unseen, Trial()).ground.reference
+    assert reference is not None and reference.first_corner_px is None
+
+
+def test_pairs_without_a_true_distance_are_left_out(copy_of: Path) -> None:
+    table = pq.read_table(copy_of / "pairs.parquet")
+    rows = np.arange(len(table))
+    pq.write_table(table.take(rows[table["entity_b"].to_numpy() != 3]), copy_of / "pairs.parquet")
+    assert load_clip(copy_of).pairs.tolist() == [[0, 1]]
 
 
 def test_true_boxes_are_the_truths_own(clip_folder: Path) -> None:

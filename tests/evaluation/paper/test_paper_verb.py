@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +13,9 @@ from evaluation.paper import drawn_board, drawn_clip
 from typer.testing import CliRunner
 
 from standoff.cli.app import app
-from standoff.core.errors import ConfigError
+from standoff.core.errors import ConfigError, SimulationError
 from standoff.evaluation.paper.published import PUBLISHED
+from standoff.simulation.presets import PRESETS, Plan
 
 
 def evaluate(*words: object) -> str:
@@ -87,6 +89,59 @@ def test_box_errors_make_ale(clip_folder: Path) -> None:
     ale = figures_of(one)["ale worker"]["measured"]
     # A centre of two edges, each 3 px off: 2.1 px a coordinate, 2.7 px on the average, of 3 cm or so.
     assert 0.03 < ale < 0.15
+
+
+def test_larger_box_errors_make_larger_errors(clip_folder: Path) -> None:
+    words = ("--method", "oriented", "--json", "-")
+    noise: tuple[tuple[str, ...], ...] = ((), *(("--detector", "noisy", "--box-error", size) for size in ("2", "8")))
+    clips = [json.loads(evaluate(clip_folder, *words, *more))["clips"][0] for more in noise]
+    for series in (
+        [clip["localisation"][0]["ale_m"] for clip in clips],
+        [clip["localisation"][0]["position_mean_m"] for clip in clips],
+        [clip["pairs"][0]["scores"]["before the filter"]["made_m"] for clip in clips],
+    ):
+        assert series[0] < series[1] < series[2]
+
+
+def test_on_flat_ground_a_flat_entity_is_off_by_the_map_alone(measured: dict[str, Any]) -> None:
+    for score in measured["localisation"]:
+        # Flat entities: whichever point of the box stands for them, it is near the foot.
+        assert score["map_mean_m"] == pytest.approx(score["position_mean_m"], abs=tolerances.FLAT_BOX_POINT_M)
+
+
+def test_a_clip_that_fails_does_not_lose_the_others(clip_folder: Path, board_folder: Path, tmp_path: Path) -> None:
+    broken = Path(shutil.copytree(board_folder, tmp_path / "broken"))
+    (broken / "video.mp4").write_bytes(b"no video")
+    out, page = tmp_path / "r.json", tmp_path / "r.html"
+    words = [clip_folder, broken, board_folder, "--json", out, "--report", page]
+    result = CliRunner().invoke(app, ["evaluate", "paper", *map(str, words)])
+    assert result.exit_code == 2
+    assert "broken" in result.stderr and "93.51 %" in result.stdout
+    written = json.loads(out.read_text())
+    assert [clip["clip"] for clip in written["clips"]] == ["drawn", "board"]
+    assert [entry["clip"] for entry in written["failed"]] == ["broken"]
+    assert "broken is missing: expected" in page.read_text(encoding="utf-8")
+
+
+def test_every_preset_is_looked_for_and_none_that_is_there_is_rendered(
+    clip_folder: Path, board_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rendered = []
+
+    def refuse(plan: Plan, out: Path, on_frame: object) -> None:
+        rendered.append((plan.name, plan.preset.frames, plan.preset.width_px))
+        raise SimulationError(expected="a graphics card", found="none", fix="buy one")
+
+    monkeypatch.setattr("standoff.simulation.record.record_clip", refuse)
+    few = {name: PRESETS[name] for name in ("virtual", "board", "busy", "far")}
+    monkeypatch.setattr("standoff.simulation.presets.PRESETS", few)
+    shutil.copytree(clip_folder, tmp_path / "virtual")
+    shutil.copytree(board_folder, tmp_path / "board")
+    words = ["--all", "--clips", tmp_path, "--size", "640x360", "--frames", "6", "--json", tmp_path / "all.json"]
+    result = CliRunner().invoke(app, ["evaluate", "paper", *map(str, words)])
+    assert result.exit_code == 2 and result.stderr.count("Buy one") == 2
+    assert rendered == [("busy", 6, 640), ("far", 6, 640)]
+    assert len(json.loads((tmp_path / "all.json").read_text())["clips"]) == 2
 
 
 def test_one_page_shows_it_all(clip_folder: Path, board_folder: Path, tmp_path: Path) -> None:

@@ -6,9 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tolerances import GEOMETRY_REL
 
+from standoff.simulation.heap import soil_heap
 from standoff.simulation.machines.digging import knee_m
 from standoff.simulation.machines.joints import settle
-from standoff.simulation.machines.machine_parts import Crawler, Ram, cab, ram_poses, scoop, soil_heap, strut_pose, wheel
+from standoff.simulation.machines.machine_parts import Crawler, Ram, cab, ram_poses, scoop, strut_pose, wheel
 from standoff.simulation.machines.paint import Painted, draw_livery, weather
 from standoff.simulation.machines.running_gear import Axles, Tracks
 from standoff.simulation.mesh import Mesh, srgb

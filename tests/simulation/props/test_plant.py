@@ -12,8 +12,8 @@ from standoff.simulation.heap import heap
 from standoff.simulation.mesh import Mesh, Surface, rotation, srgb, translation
 from standoff.simulation.props.fences import FENCE_KINDS, make_fence
 from standoff.simulation.props.plant import PLANT
-from standoff.simulation.props.prop import Prop, moved
-from standoff.simulation.scene import Batch
+from standoff.simulation.props.prop import Prop
+from standoff.simulation.scene import Batch, moved
 
 _SEEDS = range(4)
 _TRIANGLES = 16000

@@ -13,7 +13,7 @@ from standoff.evaluation.paper.result import ClipResult
 
 ISOLATES: Mapping[str, str] = MappingProxyType(
     {
-        BEFORE: "each frame by itself: its map and its boxes",
+        BEFORE: "each frame by itself: its map, its boxes, uneven ground",
         AFTER: "the same with the paper's outlier filter",
         FILLED: "the same with failed frames guessed, as the paper counted them",
         AGAINST_BENCHMARK: "the paper's own comparison: what both sides share cancels",
@@ -70,15 +70,16 @@ def pair_caption(result: ClipResult, series: PairSeries) -> str:
         f"{short} {number_text(figure.value, figure.unit)} (here {number_text(mine[short], figure.unit)})"
         for short, figure in paper.items()
     )
-    return f"{text} The paper has {values}."
+    against = "; both against the paper's substitute for truth" if series.benchmark is not None else ""
+    return f"{text} The paper has {values}{against}."
 
 
 def board_caption(board: BoardScore) -> str:
     """Say what the chart of a board shows, and what the paper has there."""
     before, after = PUBLISHED["board before"], PUBLISHED["board after"]
     return (
-        f"Accuracy (Eq. 7: 100 % less MAPE) of the distances from the first corner to the {board.corners - 1} others in "
-        f"every frame; dashed: over all frames. The paper's Fig. 8 has {number_text(before.value, '%')} before and "
+        f"Accuracy (Eq. 7: 100 % less MAPE) of the distances from the first corner to the {board.corners - 1} others "
+        f"in every frame; dashed: over all frames. The paper's Fig. 8 has {number_text(before.value, '%')} before and "
         f"{number_text(after.value, '%')} after; here {number_text(board.before_percent, '%')} and "
         f"{number_text(board.after_percent, '%')}."
     )

@@ -43,7 +43,7 @@ def corner_chart(watched: Watched, failed: BoolArray) -> str:
         axes.semilogy(frame, worst_px, ".", markersize=_marker_size(len(frame)), color=ESTIMATE)
         axes.axhline(FAILURE_PX, color=HEX["danger"], linewidth=0.9, linestyle=(0, (5, 3)))
         axes.set_ylabel("error of the worst corner, px")
-        axes.set_ylim(bottom=min(0.1, 0.8 * np.nanmin(worst_px, initial=0.1)))
+        axes.set_ylim(0.8 * np.nanmin(worst_px, initial=0.1), 1.4 * np.nanmax(worst_px, initial=FAILURE_PX))
         axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axes.yaxis.set_minor_formatter(NullFormatter())
         _finish(axes, len(frame))

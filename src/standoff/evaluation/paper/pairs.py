@@ -14,7 +14,7 @@ from standoff.core.types import TextArray
 from standoff.evaluation.paper.benchmark_polynomial import Benchmark, fit_benchmark
 from standoff.evaluation.paper.clip import Clip
 from standoff.evaluation.paper.metrics import DistanceScore, fill_as_the_filter, score_distances
-from standoff.evaluation.paper.rectified import wrong_frames
+from standoff.evaluation.paper.rectified import failed_frames
 from standoff.evaluation.paper.watch import Watched
 from standoff.stages.proximity import ProximityParams
 
@@ -81,11 +81,11 @@ class PairGroup:
 
 def pair_series(clip: Clip, watched: Watched, *, benchmark: bool) -> tuple[PairSeries, ...]:
     """Take each pair's distances out of what the monitor said."""
+    assert clip.reference is not None
     names = clip.names()
-    no_map = ~np.isfinite(watched.scale_m_per_px)
-    failed = no_map | wrong_frames(watched)
+    failed = failed_frames(watched, clip.reference)
     return tuple(
-        _one_series(clip, watched, (names[ends[0]], names[ends[1]]), column, failed, no_map, benchmark)
+        _one_series(clip, watched, (names[ends[0]], names[ends[1]]), column, failed, benchmark)
         for column, ends in enumerate(clip.pairs)
     )
 
@@ -96,7 +96,6 @@ def _one_series(
     names: tuple[str, str],
     column: int,
     failed: BoolArray,
-    no_map: BoolArray,
     benchmark: bool,
 ) -> PairSeries:
     first, second = clip.pairs[column].tolist()
@@ -115,7 +114,7 @@ def _one_series(
         truth_m=clip.distance_m[:, column],
         before_m=before_m,
         after_m=after_m,
-        filled_m=fill_as_the_filter(after_m, no_map),
+        filled_m=fill_as_the_filter(after_m, failed & ~np.isfinite(watched.scale_m_per_px)),
         failed=failed,
         reason=reason,
         benchmark=fit_benchmark(raw_m, threshold_px * watched.scale_m_per_px) if benchmark else None,

@@ -50,8 +50,8 @@ def score_rectification(watched: Watched, reference: TrueReference) -> Rectifica
     has_map = np.isfinite(watched.scale_m_per_px)
     wrong = wrong_frames(watched)
     right = has_map & ~wrong
-    out_of_sight = ~has_map & (~inside(reference, watched.size_px) | (reference.visible_share <= 0.0))
-    failed = wrong | (~has_map & ~out_of_sight)
+    failed = failed_frames(watched, reference)
+    out_of_sight = ~has_map & ~failed
     reasons = np.where(wrong, WRONG, watched.no_map)[failed]
     looked_for = int((~out_of_sight).sum())
     return RectificationScore(
@@ -68,11 +68,17 @@ def score_rectification(watched: Watched, reference: TrueReference) -> Rectifica
     )
 
 
+def failed_frames(watched: Watched, reference: TrueReference) -> BoolArray:
+    """Return (F,) which frames have a wrong map, or none although the reference is in sight."""
+    in_sight = inside(reference, watched.size_px) & (reference.visible_share > 0.0)
+    return wrong_frames(watched) | (~np.isfinite(watched.scale_m_per_px) & in_sight)
+
+
 def inside(reference: TrueReference, size_px: tuple[int, int]) -> BoolArray:
     """Return (F,) whether all four corners are in the picture; what lies on them does not matter."""
     # A corner that no lens sees is NaN, and NaN is not inside.
     in_picture = (reference.corners_px >= -0.5) & (reference.corners_px <= np.array(size_px) - 0.5)
-    return in_picture.all(axis=(1, 2))
+    return np.asarray(in_picture.all(axis=(1, 2)), dtype=np.bool_)
 
 
 def wrong_frames(watched: Watched) -> BoolArray:

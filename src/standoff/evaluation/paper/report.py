@@ -20,7 +20,7 @@ from standoff.evaluation.paper.benchmark_polynomial import DEGREE, KEPT_SD, MEDI
 from standoff.evaluation.paper.captions import ISOLATES, board_caption, number_text, pair_caption, published_for
 from standoff.evaluation.paper.figures import ESTIMATE, RAW, TREND, board_chart, corner_chart, pair_chart
 from standoff.evaluation.paper.pairs import AFTER, BEFORE, PairSeries
-from standoff.evaluation.paper.rectified import wrong_frames
+from standoff.evaluation.paper.rectified import failed_frames
 from standoff.evaluation.paper.result import ClipResult
 from standoff.evaluation.paper.snapshots import Snapshot
 from standoff.stages.sinks.folder import partial_path
@@ -81,9 +81,8 @@ def _section(result: ClipResult) -> dict[str, Any]:
     watched, snapshots = result.watched, result.watched.snapshots if result.watched else None
     charted = sorted(result.series, key=_unmeasured_and_far)[:MOST_CHARTS]
     corners = ""
-    if watched is not None:
-        failed = ~np.isfinite(watched.scale_m_per_px) | wrong_frames(watched)
-        corners = corner_chart(watched, failed)
+    if watched is not None and result.clip.reference is not None:
+        corners = corner_chart(watched, failed_frames(watched, result.clip.reference))
     return {
         "name": result.clip.name,
         "preset": result.clip.preset,

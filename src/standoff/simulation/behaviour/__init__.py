@@ -14,12 +14,11 @@ from standoff.simulation.behaviour.earthmoving import (
     rolling,
     spreading,
 )
-from standoff.simulation.behaviour.encounters import breach, crossing_behind, keep_distance, near_miss
+from standoff.simulation.behaviour.encounters import crossing_behind, keep_distance, near_miss
 from standoff.simulation.behaviour.people import carrying_between, pair_talking, standing_working, walking_past
 from standoff.simulation.behaviour.stances import random_stance
 
 __all__ = [
-    "breach",
     "carrying_between",
     "crossing_behind",
     "digging",

@@ -5,13 +5,11 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import brentq
 
-from standoff.core.classes import CLASSES
-from standoff.core.homography import FloatArray
 from standoff.simulation.behaviour.digging import digging
 from standoff.simulation.behaviour.earthmoving import driving_through, idle
 from standoff.simulation.behaviour.people import standing_working
 from standoff.simulation.driving import walk
-from standoff.simulation.motion import Place, chained, end_place, fitted, held, shifted, turned, with_joints
+from standoff.simulation.motion import Place, fitted, shifted
 from standoff.simulation.scene import Model, Motion
 
 _SEARCH_STEP_S = 0.1
@@ -77,36 +75,6 @@ def least_distance_m(first: Motion, second: Motion) -> float:
     apart = [np.interp(time_s, first.time_s, first.xy_m[:, k]) - np.interp(time_s, second.time_s, second.xy_m[:, k])
              for k in (0, 1)]  # fmt: skip
     return float(np.hypot(*apart).min())
-
-
-def breach(
-    rng: np.random.Generator, worker: Model, machine_class: int, machine_xy_m: FloatArray, duration_s: float, *,
-    depth: float = 0.3, bearing_rad: float | None = None,
-) -> Motion:  # fmt: skip
-    """Walk into a machine's action radius, stay a moment, walk out again.
-
-    Args:
-        rng: Decides on the direction, if it is not given, and on speeds.
-        worker: Who.
-        machine_class: Whose action radius, of `standoff.core.classes`.
-        machine_xy_m: (2,) the machine's centre.
-        duration_s: The deepest moment is near its middle.
-        depth: Share of the radius that is left between them less than 1: 0.3 comes to 0.7 radii.
-        bearing_rad: Direction from the machine to the worker.
-    """
-    radius_m = CLASSES[machine_class].action_radius_m
-    bearing_rad = rng.uniform(-np.pi, np.pi) if bearing_rad is None else bearing_rad
-    speed_mps = rng.uniform(0.9, 1.5)
-    outside_m = radius_m + min(6.0, 0.45 * duration_s * speed_mps)
-    centre = Place(float(machine_xy_m[0]), float(machine_xy_m[1]), bearing_rad)
-    out, inside = centre.moved(outside_m), centre.moved((1.0 - depth) * radius_m)
-    there = walk([(out.x_m, out.y_m), (inside.x_m, inside.y_m)], speed_mps)
-    stay = held(end_place(there), rng.uniform(1.0, 3.0))
-    turn = turned(end_place(there), bearing_rad, 150.0)
-    back = walk([(inside.x_m, inside.y_m), (out.x_m, out.y_m)], speed_mps)
-    stay, turn = (with_joints(piece, {"speed_mps": [(0.0, 0.0)]}) for piece in (stay, turn))
-    motion = chained([there, stay, turn, back])
-    return fitted(shifted(motion, duration_s / 2 - float(there.time_s[-1]) - float(stay.time_s[-1]) / 2), worker)
 
 
 def keep_distance(

@@ -19,8 +19,7 @@ from standoff.simulation.machines.machine_parts import ram_poses, rectangle
 from standoff.simulation.machines.paint import Painted, draw_livery
 from standoff.simulation.machines.running_gear import Tracks
 from standoff.simulation.mesh import rotation, scaling, translation
-from standoff.simulation.props.prop import moved
-from standoff.simulation.scene import Batch
+from standoff.simulation.scene import Batch, moved
 
 LIMITS: Mapping[str, tuple[float, float]] = {"blade_m": (-0.35, 0.95), "ripper": (0.0, 1.0), "track_m": UNBOUNDED_M}
 _RIPPER_PIVOT_M = (-1.75, 0.0, 0.85)

@@ -29,7 +29,7 @@ from standoff.simulation.machines.machine_parts import highest_m, ram_poses, rec
 from standoff.simulation.machines.paint import SOILS, Livery, Painted, draw_livery, weather
 from standoff.simulation.machines.running_gear import Axles, RunningGear, Tracks
 from standoff.simulation.mesh import Colour, scaling, srgb, translation
-from standoff.simulation.scene import Batch
+from standoff.simulation.scene import Batch, moved
 
 LIMITS: Mapping[str, tuple[float, float]] = {
     "swing_deg": UNBOUNDED_DEG,
@@ -86,7 +86,7 @@ class Excavator:
             sunk = translation(0.0, 0.0, (1.0 - settled["load"]) * 0.4 * self.linkage.bucket_m)
             batches.append(self.soil.at(frames[Link.BUCKET] @ sunk))
         larger = scaling(self.scale, self.scale, self.scale)
-        return tuple(replace(batch, poses=(larger @ batch.poses).astype(np.float32)) for batch in batches)
+        return moved(batches, larger)
 
     def _ram_batches(self, mount: RamMount, frames: Mapping[Link, FloatArray]) -> tuple[Batch, Batch]:
         pairs = []

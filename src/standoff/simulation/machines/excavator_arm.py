@@ -9,10 +9,11 @@ from functools import lru_cache
 import numpy as np
 import shapely
 
+from standoff.simulation.heap import soil_heap
 from standoff.simulation.machines.digging import DiggingArm, Link
 from standoff.simulation.machines.excavator_body import foot_of
 from standoff.simulation.machines.excavator_sizes import ExcavatorSize
-from standoff.simulation.machines.machine_parts import Point, Ram, beam, lamp, scoop, soil_heap
+from standoff.simulation.machines.machine_parts import Point, Ram, beam, lamp, scoop
 from standoff.simulation.machines.paint import BLACK, DARK_GREY
 from standoff.simulation.mesh import Mesh, Surface, cylinder, join, profile, rotation, translation, tube
 

@@ -21,11 +21,10 @@ from standoff.simulation.machines.machine_parts import (
     lamp,
     mirror,
     moulded,
-    shaded,
     wheel,
 )
 from standoff.simulation.machines.paint import BLACK, DARK_GREY, RED_LAMP
-from standoff.simulation.mesh import Mesh, Surface, box, cylinder, join, profile, rotation, tube
+from standoff.simulation.mesh import Mesh, Surface, box, cylinder, join, profile, rotation, toned, tube
 
 Rectangle = tuple[float, float, float, float]
 """x from, x to, y from, y to."""
@@ -113,7 +112,7 @@ def _hood(size: ExcavatorSize) -> list[Mesh]:
     chamfer_m = 0.16 if size.rounded else 0.05
     main = _block((rear_m, front_m, -half_m, half_m), floor_m, hood_m, chamfer_m)
     inner = (rear_m + 0.1, front_m - 0.08, -0.62 * half_m, 0.5 * half_m)
-    bonnet = shaded(_block(inner, hood_m - 0.02, hood_m + 0.13, 0.09 if size.rounded else 0.04), 0.93)
+    bonnet = toned(_block(inner, hood_m - 0.02, hood_m + 0.13, 0.09 if size.rounded else 0.04), 0.93)
     length_m, middle_m = front_m - rear_m, (front_m + rear_m) / 2
     vent = _plate((middle_m - 0.2 * length_m, middle_m + 0.25 * length_m, -0.1 * half_m, 0.36 * half_m), hood_m + 0.12,
                   DARK_GREY)  # fmt: skip
@@ -137,7 +136,7 @@ def _right_side(size: ExcavatorSize) -> list[Mesh]:
     inner_m = -half_m + min(0.85, 0.62 * half_m)
     chamfer_m = 0.1 if size.rounded else 0.04
     step_m, box_m = 0.3 * front_m, floor_m + 0.5 * (hood_m - floor_m)
-    tank = shaded(_block((back_m, step_m, -half_m, inner_m), floor_m, hood_m - 0.06, chamfer_m), 1.04)
+    tank = toned(_block((back_m, step_m, -half_m, inner_m), floor_m, hood_m - 0.06, chamfer_m), 1.04)
     tools = _block((step_m + 0.02, front_m - 0.12, -half_m, inner_m - 0.06), floor_m, box_m, chamfer_m)
     grip = _plate((back_m + 0.08, step_m - 0.1, -half_m + 0.14, inner_m - 0.1), hood_m - 0.07, DARK_GREY)
     tread = _plate((step_m + 0.1, front_m - 0.25, -half_m + 0.12, inner_m - 0.16), box_m - 0.01, DARK_GREY)
@@ -181,7 +180,7 @@ def _counterweight(size: ExcavatorSize) -> Mesh:
     if not size.rounded:
         red = box((0.04, 0.22, 0.1), RED_LAMP, Surface.GLASS)
         extras += [red.at(-0.965 * tail_m, side * 0.7 * half_m, bottom_m + 0.3) for side in (-1, 1)]
-    return join([body, shaded(belly, 0.6), *extras])
+    return join([body, toned(belly, 0.6), *extras])
 
 
 def crawler_of(size: ExcavatorSize) -> Crawler:

@@ -7,6 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from standoff.simulation.heap import soil_heap
 from standoff.simulation.machines.machine_parts import (
     beacon,
     beam,
@@ -20,12 +21,10 @@ from standoff.simulation.machines.machine_parts import (
     mirror,
     moulded,
     scoop,
-    shaded,
-    soil_heap,
     wheel,
 )
 from standoff.simulation.machines.paint import BLACK, DARK_GREY, RED_LAMP
-from standoff.simulation.mesh import Mesh, Surface, box, cylinder, join, profile, rotation, translation
+from standoff.simulation.mesh import Mesh, Surface, box, cylinder, join, profile, rotation, toned, translation
 
 _SHELL = ((1.34, -0.30), (0.47, -0.33), (0.23, -0.25), (0.10, -0.02), (0.11, 0.25), (0.24, 0.55), (0.50, 0.80))
 _EAR_XZ = (-0.10, 0.42)
@@ -178,7 +177,7 @@ def _hood(size: LoaderSize) -> list[Mesh]:
                  floor_m=top_m - drop_m)
         for y_m in (-half_m + 0.05, half_m - 0.05)
     ]  # fmt: skip
-    return [body, shaded(crest, 0.97), *vents, louvre, pipe, intake, *rails]
+    return [body, toned(crest, 0.97), *vents, louvre, pipe, intake, *rails]
 
 
 def _fenders(size: LoaderSize, end: float) -> list[Mesh]:

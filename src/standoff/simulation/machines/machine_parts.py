@@ -6,7 +6,7 @@ Every function returns a fresh mesh: cache whole machines, since meshes are comp
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import shapely
@@ -73,11 +73,6 @@ def beam(
     length_m = float(np.linalg.norm(np.subtract(end_m, start_m)))
     bar = box((length_m, size_m[0], size_m[1]), colour, surface).at(length_m / 2, 0.0, -size_m[1] / 2)
     return bar.moved(strut_pose(start_m, end_m))
-
-
-def shaded(mesh: Mesh, factor: float) -> Mesh:
-    """Return the mesh with its albedo multiplied: neighbouring panels are never quite the same."""
-    return replace(mesh, albedo=np.asarray(mesh.albedo * np.float32(factor), dtype=np.float32))
 
 
 def wheel(
@@ -354,19 +349,6 @@ def scoop(
         outline = [(float(x_m), float(z_m)) for x_m, z_m in wedge]
         plates.append(profile(outline, 0.1, colour, Surface.STEEL).at(0.0, float(y_m), 0.0))
     return join(plates)
-
-
-def soil_heap(length_m: float, width_m: float, height_m: float, colour: Colour | None, *, seed: int = 0) -> Mesh:
-    """Return loose soil heaped on z = 0 over an ellipse-cornered rectangle centred in x and y, bumpy."""
-    rng = np.random.default_rng(seed)
-    u, v = np.meshgrid(np.linspace(-1.0, 1.0, 9), np.linspace(-1.0, 1.0, 9), indexing="ij")
-    rise = np.sqrt(np.clip((1.0 - u**4) * (1.0 - v**4), 0.0, 1.0))
-    z_m = height_m * rise * rng.uniform(0.72, 1.0, u.shape)
-    points = np.column_stack([(u * length_m / 2).ravel(), (v * width_m / 2).ravel(), z_m.ravel()])
-    corner = np.arange(81).reshape(9, 9)
-    a, b, c, d = corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:]
-    faces = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
-    return Mesh.of(trimesh.Trimesh(points, faces, process=False), colour, Surface.SOIL, crease_deg=50.0)
 
 
 def rectangle(length_m: float, width_m: float) -> FloatArray:

@@ -21,10 +21,11 @@ import trimesh
 
 from standoff.core.errors import DataError
 from standoff.core.homography import FloatArray
+from standoff.simulation.heap import soil_heap
 from standoff.simulation.machines.digging import DiggingArm, Link
 from standoff.simulation.machines.excavator import LIMITS, Excavator, finished, rest_of
 from standoff.simulation.machines.excavator_arm import RamMount, mount_rams
-from standoff.simulation.machines.machine_parts import Point, beam, rectangle, soil_heap
+from standoff.simulation.machines.machine_parts import Point, beam, rectangle
 from standoff.simulation.machines.paint import SOILS, Painted, draw_livery, weather
 from standoff.simulation.mesh import Mesh, Surface, join, rotation, srgb, translation
 

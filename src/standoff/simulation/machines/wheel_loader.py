@@ -22,7 +22,7 @@ from standoff.simulation.machines.loader_meshes import SIZES, LoaderMeshes, Load
 from standoff.simulation.machines.machine_parts import Ram, highest_m, ram_poses, rectangle, strut_pose
 from standoff.simulation.machines.paint import SOILS, Livery, Painted, draw_livery, weather
 from standoff.simulation.mesh import Colour, rotation, scaling, srgb, translation
-from standoff.simulation.scene import Batch
+from standoff.simulation.scene import Batch, moved
 
 LIMITS: Mapping[str, tuple[float, float]] = {
     "steer_deg": (-38.0, 38.0),
@@ -73,7 +73,7 @@ class WheelLoader:
         settled = settle(joints, self.joints, _REST)
         batches = (*self._halves(settled), *self._linkage(settled))
         larger = scaling(self.scale, self.scale, self.scale)
-        return tuple(replace(batch, poses=(larger @ batch.poses).astype(np.float32)) for batch in batches)
+        return moved(batches, larger)
 
     def _halves(self, joints: Mapping[str, float]) -> list[Batch]:
         meshes, colours, dust = self.meshes, self.colours, self.colours.livery.dust

@@ -7,7 +7,6 @@ from functools import lru_cache
 from standoff.simulation.mesh import Mesh, Surface, join
 from standoff.simulation.people.loft import Ring, even_columns, loft
 
-HARD_HATS = ("hard_hat", "hard_hat_brim")
 _ROUND = even_columns(14)
 _RIM_Z_M = 0.118
 

@@ -122,10 +122,6 @@ class Worker:
         """Return body and clothes without what is carried."""
         return self._dressed(self._posture(joints))
 
-    def belongings(self, joints: Mapping[str, float]) -> tuple[Batch, ...]:
-        """Return what is carried or worked with; nothing while `arms` is 0.5 or less."""
-        return self._burdened(self._posture(joints))
-
     def tool_tip_m(self, joints: Mapping[str, float]) -> FloatArray | None:
         """Return None: people have no bucket."""
         return None

@@ -8,6 +8,7 @@ import numpy as np
 
 from standoff.simulation.bars import bars, blotches, corrugated, grid
 from standoff.simulation.mesh import Mesh, Surface, box, join, profile, rotation, slab, srgb, translation
+from standoff.simulation.props.materials import aged
 from standoff.simulation.scene import Batch, place
 
 _LENGTH_M, _WIDTH_M, _HEIGHT_M = 6.06, 2.44, 2.7
@@ -41,12 +42,12 @@ def make_toilet(rng: np.random.Generator) -> tuple[Batch, ...]:
     count = int(rng.choice([1, 1, 1, 2, 3]))
     shift = (np.arange(count) - (count - 1) / 2) * 1.25
     poses = np.stack([translation(rng.normal(0, 0.04), y, 0.0) @ rotation("z", rng.normal(0, 2)) for y in shift])
-    tint = np.array(_TOILETS[int(rng.integers(len(_TOILETS)))]) * rng.uniform(0.8, 1.1, (count, 1))
+    tint = aged(rng, _TOILETS, (0.8, 1.1), count)
     return (place(_toilet(), poses, tint=tint, dust=rng.uniform(0.05, 0.4)),)
 
 
 def _cabins(rng: np.random.Generator, columns: int, storeys: int) -> tuple[Batch, ...]:
-    wall = np.array(_WALLS[int(rng.integers(len(_WALLS)))]) * rng.uniform(0.85, 1.05)
+    wall = aged(rng, _WALLS, (0.85, 1.05))
     batches = []
     for level in range(storeys):
         for column in range(columns):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from standoff.simulation.mesh import Colour, Mesh, Surface, cylinder, join, rotation, srgb, translation
+from standoff.simulation.mesh import Colour, Mesh, Surface, cylinder, join, rotation, srgb, toned, translation
 from standoff.simulation.props.materials import (
     BARE_STEEL,
     CONCRETE,
@@ -17,7 +17,6 @@ from standoff.simulation.props.materials import (
     bar,
     block,
     single,
-    toned,
     varied,
 )
 from standoff.simulation.props.prop import Prop

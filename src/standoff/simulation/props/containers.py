@@ -7,9 +7,11 @@ from functools import lru_cache
 import numpy as np
 
 from standoff.core.homography import FloatArray
-from standoff.simulation.bars import bars, blotches, corrugated, grid, quads, rusted
+from standoff.simulation.bars import bars, blotches, corrugated, grid, rusted
 from standoff.simulation.heap import heap
 from standoff.simulation.mesh import Colour, Mesh, Surface, box, join, rotation, srgb, translation
+from standoff.simulation.panels import panels
+from standoff.simulation.props.materials import aged
 from standoff.simulation.scene import Batch, place
 
 _LENGTHS_M = (6.06, 6.06, 2.99, 12.19)
@@ -61,14 +63,14 @@ def make_container(rng: np.random.Generator) -> tuple[Batch, ...]:
         pose = translation(rng.normal(0.0, 0.04), rng.normal(0.0, 0.04), level * _HEIGHT_M) @ rotation(
             "z", 180.0 * rng.integers(2)
         )
-        tint = np.array(_PAINTS[int(rng.integers(len(_PAINTS)))]) * rng.uniform(0.75, 1.1)
+        tint = aged(rng, _PAINTS, (0.75, 1.1))
         batches.append(place(_container(variant), pose, tint=tint, dust=rng.uniform(0.1, 0.5)))
     return tuple(batches)
 
 
 def make_skip(rng: np.random.Generator) -> tuple[Batch, ...]:
     """Build an open skip with sloping ends, or a long roll-off dumpster, empty or full of rubble."""
-    tint = np.array(_PAINTS[int(rng.integers(len(_PAINTS)))]) * rng.uniform(0.7, 1.0)
+    tint = aged(rng, _PAINTS, (0.7, 1.0))
     mesh = _skip(int(rng.integers(_VARIANTS)), bool(rng.random() < 0.35))
     return (place(mesh, np.eye(4), tint=tint, dust=rng.uniform(0.3, 0.7)),)
 
@@ -145,7 +147,7 @@ def _hull(rng: np.random.Generator, size_m: tuple[float, float, float], overhang
     low = _ring(length_m - 2 * overhang_m, width_m, 0.12)
     high = _ring(length_m, width_m, height_m)
     rim = np.stack([high, np.roll(high, -1, axis=0)], axis=1)
-    floor = quads(low[None], np.array([[0.0, 0.0, 1.0]]), srgb("#4a4038"), Surface.RUST)
+    floor = panels(low[None], srgb("#4a4038"), Surface.RUST)
     rib_x = np.arange(-length_m / 2 + overhang_m + 0.3, length_m / 2 - overhang_m, 0.65)
     ribs = [((x, s * width_m / 2, 0.1), (x, s * width_m / 2, height_m)) for x in rib_x for s in (-1, 1)]
     skids = [((-length_m / 2 + overhang_m, s * 0.5, 0.06), (length_m / 2 - overhang_m, s * 0.5, 0.06)) for s in (-1, 1)]
@@ -172,5 +174,4 @@ def _ring(length_m: float, width_m: float, z_m: float) -> FloatArray:
 def _walls(low_m: FloatArray, high_m: FloatArray, colour: Colour | None, surface: Surface) -> Mesh:
     after = np.roll(low_m, -1, axis=0)
     corners = np.stack([low_m, after, np.roll(high_m, -1, axis=0), high_m], axis=1)
-    normals = np.cross(after - low_m, high_m - low_m)
-    return quads(corners, normals / np.linalg.norm(normals, axis=1, keepdims=True), colour, surface)
+    return panels(corners, colour, surface)

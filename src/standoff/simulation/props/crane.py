@@ -8,6 +8,7 @@ import numpy as np
 
 from standoff.simulation.bars import bars, lattice
 from standoff.simulation.mesh import Mesh, Surface, box, cylinder, join, rotation, srgb, translation, tube
+from standoff.simulation.props.materials import aged
 from standoff.simulation.scene import Batch, place
 
 _PAINTS = tuple(srgb(code) for code in ("#d99a12", "#c7b03a", "#b3341f", "#d8d5cc", "#8b9094", "#d07a1c"))
@@ -19,7 +20,7 @@ _HEAVY = srgb("#a8a49b")
 def make_crane(rng: np.random.Generator) -> tuple[Batch, ...]:
     """Build a tower crane 24 to 42 m high, its jib pointing anywhere."""
     sections = int(rng.integers(4, 8))
-    tint = np.array(_PAINTS[int(rng.integers(len(_PAINTS)))]) * rng.uniform(0.75, 1.0)
+    tint = aged(rng, _PAINTS, (0.75, 1.0))
     dust = rng.uniform(0.05, 0.3)
     mast = np.stack([translation(0.0, 0.0, 0.6 + level * _SECTION_M) for level in range(sections)])
     top_m = 0.6 + sections * _SECTION_M

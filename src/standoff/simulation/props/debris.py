@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from standoff.core.homography import FloatArray
-from standoff.simulation.mesh import Mesh, Surface, cylinder, join, rotation, srgb, translation, tube
+from standoff.simulation.mesh import Mesh, Surface, cylinder, join, rotation, srgb, toned, translation, tube
 from standoff.simulation.props.materials import (
     DARK_PLASTIC,
     FADED,
@@ -22,7 +22,6 @@ from standoff.simulation.props.materials import (
     scattered,
     single,
     tints,
-    toned,
     tubular,
     varied,
 )

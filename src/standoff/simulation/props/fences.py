@@ -11,6 +11,7 @@ import numpy as np
 from standoff.core.homography import FloatArray
 from standoff.simulation.bars import bars, blotches, corrugated, grid
 from standoff.simulation.mesh import Colour, Mesh, Surface, box, cylinder, join, profile, rotation, srgb, translation
+from standoff.simulation.props.materials import aged
 from standoff.simulation.scene import Batch, place
 
 FENCE_KINDS = ("mesh", "banner", "hoarding", "barrier", "tape")
@@ -49,7 +50,7 @@ def make_fence(
     dust = rng.uniform(0.1, 0.6, len(poses))
     grey = np.tile(rng.uniform(0.75, 1.05), (len(poses), 3)) * rng.uniform(0.9, 1.0, (len(poses), 1))
     if kind == "hoarding":
-        board = np.array(_BOARDS[int(rng.integers(len(_BOARDS)))]) * rng.uniform(0.85, 1.0, (len(poses), 1))
+        board = aged(rng, _BOARDS, (0.85, 1.0), len(poses))
         return (place(_board(), poses, tint=board, dust=dust),)
     if kind == "barrier":
         return (place(_barrier(), poses, tint=grey * np.array(srgb("#a8a49a")), dust=dust),)
@@ -116,7 +117,11 @@ def _stand(
 def _banners(rng: np.random.Generator, poses: FloatArray) -> tuple[Batch, ...]:
     cloth = np.array(_CLOTHS[int(rng.integers(len(_CLOTHS)))])
     covered = np.flatnonzero(rng.random(len(poses)) < rng.uniform(0.3, 1.0))
-    prints = rng.integers(_BANNERS, size=len(covered)) if rng.random() < 0.4 else np.full(len(covered), rng.integers(6))
+    prints = (
+        rng.integers(_BANNERS, size=len(covered))
+        if rng.random() < 0.4
+        else np.full(len(covered), rng.integers(_BANNERS))
+    )
     batches = []
     for variant in np.unique(prints):
         chosen = poses[covered[prints == variant]]

@@ -10,7 +10,7 @@ import shapely
 import trimesh
 
 from standoff.core.homography import FloatArray
-from standoff.simulation.mesh import Colour, Mesh, Surface, join, rotation, scaling, srgb
+from standoff.simulation.mesh import Colour, Mesh, Surface, join, rotation, scaling, srgb, toned
 from standoff.simulation.props.materials import (
     FADED,
     SANDS,
@@ -26,7 +26,6 @@ from standoff.simulation.props.materials import (
     scattered,
     stone,
     tints,
-    toned,
     varied,
 )
 from standoff.simulation.props.prop import Prop

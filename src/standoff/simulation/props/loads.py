@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from standoff.simulation.mesh import Colour, Mesh, Surface, join, rotation, srgb, translation
+from standoff.simulation.mesh import Colour, Mesh, Surface, join, rotation, srgb, toned, translation
 from standoff.simulation.props.materials import (
     FADED,
     SANDS,
@@ -18,7 +18,6 @@ from standoff.simulation.props.materials import (
     relief,
     ripples,
     tints,
-    toned,
     varied,
 )
 from standoff.simulation.props.prop import Prop

@@ -20,10 +20,12 @@ from standoff.simulation.mesh import (
     Surface,
     box,
     cylinder,
+    grid_faces,
     join,
     rotation,
     scaling,
     srgb,
+    toned,
     translation,
 )
 from standoff.simulation.props.prop import Prop
@@ -87,12 +89,6 @@ def bar(
     return _unit_bar(colour, surface, sections, capped).moved(pose)
 
 
-def toned(mesh: Mesh, tone: float | FloatArray) -> Mesh:
-    """Return the mesh lighter or darker by a factor, one for all or (V,); tinting still works on top of it."""
-    factor = np.asarray(tone, dtype=np.float32).reshape(-1, 1)
-    return replace(mesh, albedo=np.clip(mesh.albedo * factor, 0.0, 1.0 if mesh.tintable.any() else 0.85))
-
-
 def open_ended(mesh: Mesh, axis: int) -> Mesh:
     """Return a closed tube along an axis (0, 1, 2) whose ends look like openings: nearly black."""
     end = np.abs(mesh.normals[:, axis]) > 0.9
@@ -109,10 +105,7 @@ def relief(points_m: FloatArray, colour: Colour | None, surface: Surface, mottli
         mottling: Standard deviation of the colour from point to point.
     """
     rows, columns = points_m.shape[:2]
-    index = np.arange(rows * columns).reshape(rows, columns)
-    a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
-    faces = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
-    solid = trimesh.Trimesh(points_m.reshape(-1, 3), faces, process=True)
+    solid = trimesh.Trimesh(points_m.reshape(-1, 3), grid_faces(rows, columns), process=True)
     solid.update_faces(solid.nondegenerate_faces())
     solid.remove_unreferenced_vertices()
     mesh = Mesh.of(solid, colour, surface, crease_deg=75.0)
@@ -181,6 +174,20 @@ def tints(rng: np.random.Generator, palette: Sequence[Colour], count: int, sprea
     """Return (N, 3) colours near those of a palette, each a little lighter or darker, none above 0.85."""
     chosen = np.asarray(palette)[rng.integers(len(palette), size=count)]
     return np.clip(chosen * rng.uniform(1.0 - spread, 1.0 + spread, (count, 1)), 0.01, 0.85)
+
+
+def aged(
+    rng: np.random.Generator, palette: Sequence[Colour], shares: tuple[float, float], count: int = 1
+) -> FloatArray:
+    """Return (count, 3) tones of one colour of a palette, each multiplied by a share within a range.
+
+    Args:
+        rng: Decides.
+        palette: Clean colours.
+        shares: Least and largest factor.
+        count: How many tones.
+    """
+    return np.array(palette[int(rng.integers(len(palette)))]) * rng.uniform(*shares, (count, 1))
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,6 @@ from standoff.simulation.props.site_machines import (
     make_lighting_mast,
     make_pump,
     make_silo,
-    make_small_mixer,
 )
 from standoff.simulation.props.tanks import make_tank
 from standoff.simulation.props.yard import make_cones, make_drums, make_edge_rail, make_signs
@@ -40,7 +39,6 @@ PLANT: Mapping[str, Prop] = {
         Prop("compressor", 2.5, make_compressor, 0.6),
         Prop("lighting_mast", 2.2, make_lighting_mast, 0.5),
         Prop("silo", 3.2, make_silo, 0.6),
-        Prop("small_mixer", 1.2, make_small_mixer, 0.7),
         Prop("tank", 2.3, make_tank, 0.8),
         Prop("pump", 1.4, make_pump, 0.6),
         Prop("scaffold_tower", 2.0, make_scaffold_tower, 0.8),

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
-from standoff.core.homography import FloatArray
 from standoff.simulation.scene import Batch
 
 
@@ -26,8 +25,3 @@ class Prop:
     radius_m: float
     make: Callable[[np.random.Generator], tuple[Batch, ...]]
     weight: float = 1.0
-
-
-def moved(batches: Sequence[Batch], pose: FloatArray) -> tuple[Batch, ...]:
-    """Return the batches through a (4, 4) pose: from the local frame of a prop or model to where it stands."""
-    return tuple(replace(batch, poses=np.asarray(pose @ batch.poses, dtype=np.float32)) for batch in batches)

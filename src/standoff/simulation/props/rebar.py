@@ -4,18 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from standoff.simulation.mesh import Mesh, Surface, join, rotation, srgb, translation
-from standoff.simulation.props.materials import (
-    RUSTY_STEEL,
-    WOODS,
-    bar,
-    block,
-    scattered,
-    single,
-    tints,
-    toned,
-    varied,
-)
+from standoff.simulation.mesh import Mesh, Surface, join, rotation, srgb, toned, translation
+from standoff.simulation.props.materials import RUSTY_STEEL, WOODS, bar, block, scattered, single, tints, varied
 from standoff.simulation.props.prop import Prop
 from standoff.simulation.scene import Batch, place
 

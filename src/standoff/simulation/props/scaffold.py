@@ -9,10 +9,10 @@ import numpy as np
 from standoff.core.homography import FloatArray
 from standoff.simulation.bars import bars
 from standoff.simulation.mesh import Mesh, Surface, box, join, srgb, translation
+from standoff.simulation.props.materials import aged
 from standoff.simulation.scene import Batch, place
 
 _BAY_M, _DEPTH_M, _LIFT_M = 2.5, 1.05, 2.0
-_TUBE = srgb("#8f9496")
 _TUBES = (srgb("#9a9ea0"), srgb("#8c8f8e"), srgb("#b0761f"), srgb("#3f5f86"), srgb("#7d5a44"))
 _WALLS = tuple(srgb(code) for code in ("#a7a298", "#b8b2a6", "#8f6a55", "#a58a70", "#c3bfb4"))
 
@@ -30,13 +30,13 @@ def make_scaffold(rng: np.random.Generator) -> tuple[Batch, ...]:
         batches = (*batches, *_netting(rng, bays, lifts))
     if rng.random() < 0.5:
         return batches
-    tint = np.array(_WALLS[int(rng.integers(len(_WALLS)))]) * rng.uniform(0.8, 1.05)
+    tint = aged(rng, _WALLS, (0.8, 1.05))
     stretch = np.diag([bays * _BAY_M / 10.0, 1.0, (lifts * _LIFT_M - 0.6) / 6.0, 1.0])
     return (*batches, place(_wall(), translation(0.0, 1.0, 0.0) @ stretch, tint=tint, dust=rng.uniform(0.1, 0.4)))
 
 
 def _scaffold(rng: np.random.Generator, bays: int, lifts: int) -> tuple[Batch, ...]:
-    tint = np.array(_TUBES[int(rng.integers(len(_TUBES)))]) * rng.uniform(0.8, 1.0)
+    tint = aged(rng, _TUBES, (0.8, 1.0))
     dust = rng.uniform(0.1, 0.5)
     bay_x = (np.arange(bays) - (bays - 1) / 2) * _BAY_M
     cells = np.stack([translation(x, 0.0, lift * _LIFT_M) for x in bay_x for lift in range(lifts)])

@@ -1,4 +1,4 @@
-"""Machines that stand still: generators, compressors, lighting masts, mixers, silos, pumps."""
+"""Machines that stand still: generators, compressors, lighting masts, silos, pumps."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ from standoff.simulation.mesh import (
     translation,
     tube,
 )
+from standoff.simulation.props.materials import aged
 from standoff.simulation.scene import Batch, place
 
 _PAINTS = tuple(
@@ -56,11 +57,6 @@ def make_silo(rng: np.random.Generator) -> tuple[Batch, ...]:
     return (_painted(rng, _silo(), poses),)
 
 
-def make_small_mixer(rng: np.random.Generator) -> tuple[Batch, ...]:
-    """Build a small concrete mixer with its tilted drum."""
-    return (_painted(rng, _small_mixer(), rotation("z", rng.uniform(0, 360))),)
-
-
 def make_pump(rng: np.random.Generator) -> tuple[Batch, ...]:
     """Build a portable pump with suction and delivery hose."""
     hoses = [place(_cable(int(rng.integers(4))), rotation("z", turn), dust=0.15) for turn in (0.0, 180.0)]
@@ -68,7 +64,7 @@ def make_pump(rng: np.random.Generator) -> tuple[Batch, ...]:
 
 
 def _painted(rng: np.random.Generator, mesh: Mesh, poses: FloatArray) -> Batch:
-    tint = np.array(_PAINTS[int(rng.integers(len(_PAINTS)))]) * rng.uniform(0.75, 1.0)
+    tint = aged(rng, _PAINTS, (0.75, 1.0))
     return place(mesh, poses, tint=tint, dust=rng.uniform(0.1, 0.6))
 
 
@@ -179,29 +175,6 @@ def _silo() -> Mesh:
             bars(np.array([*rungs, *rails, *top, *posts]), 0.04, _STEEL),
             box((2.4, 2.4, 0.1), srgb("#8a867c"), Surface.CONCRETE),
             box((0.6, 0.5, 0.6), _DARK).at(0.0, 0.0, 0.7),
-        ]
-    )
-
-
-@lru_cache(maxsize=1)
-def _small_mixer() -> Mesh:
-    drum = lathe(
-        [(0.05, -0.4), (0.28, -0.35), (0.4, -0.05), (0.4, 0.1), (0.2, 0.5), (0.17, 0.5), (0.36, 0.08), (0.0, -0.3)],
-        None,
-        Surface.PAINT,
-        sections=16,
-    )
-    legs = [((-0.45, s * 0.42, 0.0), (0.1, s * 0.3, 0.95)) for s in (-1, 1)] + [
-        ((0.6, s * 0.4, 0.0), (0.1, s * 0.3, 0.95)) for s in (-1, 1)
-    ]
-    tyre = wheel(0.2, 0.08, _STEEL, sections=10)
-    return join(
-        [
-            drum.moved(translation(0.1, 0.0, 0.95) @ rotation("y", 40.0)),
-            bars(np.array(legs), 0.05, _STEEL),
-            *(tyre.at(-0.45, s * 0.45, 0.2) for s in (-1, 1)),
-            box((0.35, 0.3, 0.4), None).at(-0.3, 0.35, 0.7),
-            cylinder(0.22, 0.03, _DARK, axis="y", sections=12).at(0.1, -0.42, 0.95),
         ]
     )
 

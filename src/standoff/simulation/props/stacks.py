@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from standoff.simulation.mesh import Mesh, Surface, cylinder, join, rotation, srgb
+from standoff.simulation.mesh import Mesh, Surface, cylinder, join, rotation, srgb, toned
 from standoff.simulation.props.materials import (
     CONCRETE,
     DARK_PLASTIC,
@@ -20,7 +20,6 @@ from standoff.simulation.props.materials import (
     open_ended,
     piled,
     single,
-    toned,
     tubular,
     varied,
 )

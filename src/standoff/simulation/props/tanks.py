@@ -8,6 +8,7 @@ import numpy as np
 
 from standoff.simulation.bars import bars
 from standoff.simulation.mesh import Mesh, Surface, box, cylinder, join, lathe, scaling, srgb, translation, tube
+from standoff.simulation.props.materials import aged
 from standoff.simulation.scene import Batch, place
 
 _PAINTS = tuple(srgb(code) for code in ("#d9d8d2", "#3f6f4c", "#c9651e", "#2f6fa5", "#8c9194", "#d8a01c"))
@@ -34,7 +35,7 @@ def make_tank(rng: np.random.Generator) -> tuple[Batch, ...]:
         tint = np.array(_PLASTICS[int(rng.integers(len(_PLASTICS)))])
         stretch = scaling(1.0, 1.0, rng.uniform(0.8, 1.2))
         return (place(_water_tank(), stretch, tint=tint, dust=rng.uniform(0.1, 0.5)),)
-    tint = np.array(_PAINTS[int(rng.integers(len(_PAINTS)))]) * rng.uniform(0.75, 1.0)
+    tint = aged(rng, _PAINTS, (0.75, 1.0))
     return (place(_fuel_tank(), np.eye(4), tint=tint, dust=rng.uniform(0.1, 0.6)),)
 
 

@@ -6,7 +6,19 @@ from itertools import pairwise
 
 import numpy as np
 
-from standoff.simulation.mesh import Mesh, Surface, ball, cylinder, join, lathe, profile, rotation, srgb, translation
+from standoff.simulation.mesh import (
+    Mesh,
+    Surface,
+    ball,
+    cylinder,
+    join,
+    lathe,
+    profile,
+    rotation,
+    srgb,
+    toned,
+    translation,
+)
 from standoff.simulation.props.materials import (
     BARE_STEEL,
     DARK_PLASTIC,
@@ -24,7 +36,6 @@ from standoff.simulation.props.materials import (
     mound,
     single,
     tints,
-    toned,
     varied,
 )
 from standoff.simulation.props.prop import Prop
@@ -230,7 +241,7 @@ TOOLS: tuple[Prop, ...] = (
     single("ladder", 2.6, 0.8, _ladder, free=True),
     single("tripod", 0.7, 0.6, _tripod, free=True),
     single("gas bottles", 0.6, 0.7, _gas_bottles),
-    single("small mixer", 0.9, 0.5, _mixer, free=True),
+    single("small mixer", 0.9, 1.0, _mixer, free=True),
     single("post", 0.5, 2.0, _post, free=True, variants=12),
     single("rolls on end", 1.0, 0.8, _rolls_upright, (DARK_PLASTIC, WHITE_PLASTIC, *FADED)),
     Prop("buckets", 1.1, _buckets, 1.0),
