@@ -6,6 +6,7 @@ import moderngl
 import pytest
 from cli.calling import Call
 
+from standoff import simulation
 from standoff.simulation.presets import MAX_SEED, PRESETS
 
 _CLIP = ("--frames", 1, "--size", "160x90", "--processes", 1)
@@ -48,6 +49,16 @@ def test_a_wrong_option_is_one_line_and_writes_nothing(call: Call, tmp_path: Pat
     code, out, err = call("simulate", *words, "--out", tmp_path / "out")
     assert code == 2 and out == "" and _is_one_line(err)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("words", [("mobile", *_CLIP), _SET[1:]])
+def test_an_install_without_the_extra_is_told_so_in_one_line(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: tuple[object, ...]
+) -> None:
+    monkeypatch.setattr(simulation, "find_spec", lambda name: None if name == "shapely" else object())
+    code, out, err = call("simulate", *words, "--out", tmp_path / "out")
+    assert code == 2 and out == "" and _is_one_line(err)
+    assert "no shapely" in err and "pip install 'standoff[sim]'" in err
 
 
 @pytest.mark.parametrize("words", [("mobile", *_CLIP), _SET[1:]])

@@ -131,6 +131,14 @@ def test_an_area_without_free_ground_stays_empty() -> None:
     assert lay_out(np.random.default_rng(0), CLUTTER, 0.3, (everywhere,), EXTENT_M, hillside()) == ()
 
 
+def test_an_empty_area_keeps_nothing_clear() -> None:
+    with_it, without = (
+        lay_out(np.random.default_rng(0), CLUTTER, 0.1, areas, EXTENT_M, hillside())
+        for areas in ((shapely.Polygon(),), ())
+    )
+    assert sum(len(batch.poses) for batch in with_it) == sum(len(batch.poses) for batch in without) > 0
+
+
 def test_most_things_are_square_to_the_building_and_some_are_not() -> None:
     batches = lay_out(np.random.default_rng(2), [BRICKS[0][0]], 0.2, (), EXTENT_M, hillside(rise=0.0, wave_m=0.0))
     turns_deg = np.rad2deg(np.arctan2(batches[0].poses[:, 1, 0], batches[0].poses[:, 0, 0])) % 90.0

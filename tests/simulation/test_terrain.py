@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import shapely
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -233,3 +234,13 @@ def test_a_shifted_straight_path_keeps_its_distance(offset_m: float, turn: float
     np.testing.assert_allclose(np.linalg.norm(shifted - line, axis=1), offset_m, atol=1e-9)
     left = np.array([-np.sin(turn), np.cos(turn)])
     np.testing.assert_allclose((shifted - line) @ left, offset_m, atol=1e-9)
+
+
+@pytest.mark.parametrize("style", list(SiteStyle))
+@pytest.mark.parametrize("seed", range(3))
+def test_nothing_is_dug_heaped_or_cast_where_somebody_goes(style: SiteStyle, seed: int) -> None:
+    way = shapely.LineString([(-40.0, -20.0), (0.0, 5.0), (35.0, 30.0)]).buffer(2.0)
+    plan = random_plan(np.random.default_rng(seed), style, ways=[way])
+    dug = [shapely.Polygon(thing.outline_m) for thing in (*plan.pits, *plan.slabs)]
+    heaped = [shapely.Point(heap.centre_m).buffer(0.9 * heap.radius_m) for heap in plan.heaps]
+    assert not any(shape.intersects(way) for shape in dug + heaped)

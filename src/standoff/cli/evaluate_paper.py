@@ -145,6 +145,9 @@ def _evaluate_all(
 
 def _render(plan: Plan, folder: Path) -> None:
     from standoff.cli.console import progress
+    from standoff.simulation import require_packages
+
+    require_packages()
     from standoff.simulation.record import record_clip
 
     with progress(f"rendering {plan.name}", plan.preset.frames) as on_frame:

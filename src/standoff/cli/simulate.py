@@ -10,6 +10,7 @@ import typer
 from typer.core import TyperGroup
 
 from standoff.cli.numbers import two_integers
+from standoff.simulation import require_packages
 from standoff.simulation.presets import MAX_SEED, PRESETS
 
 
@@ -76,6 +77,8 @@ def _clip_command(name: str) -> Callable[..., None]:
     ) -> None:
         from standoff.cli.console import progress
         from standoff.simulation.presets import plan_clip
+
+        require_packages()
         from standoff.simulation.record import record_clip
 
         width_px, height_px = parse_size(size)
@@ -113,6 +116,8 @@ def dataset(
 ) -> None:
     """Render independent scenes for training, split by scene."""
     from standoff.cli.console import progress
+
+    require_packages()
     from standoff.simulation.dataset import DatasetPlan, record_dataset
 
     width_px, height_px = parse_size(size)

@@ -104,7 +104,7 @@ PRESETS: Mapping[str, Preset] = MappingProxyType(
         ),
         "board": Preset(
             "The paper's lab test at full size: a checkerboard of 25 m under a drone.",
-            "board", frames=148, motion="orbit", shape="board", style="yard", altitude_m=38.0, condition="afternoon",
+            "board", frames=148, motion="orbit", shape="board", style="yard", altitude_m=38.0, condition="overcast",
             clutter=0.5, reference_offset_m=(0.0, 0.0),
         ),
         "busy": Preset(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,6 +15,7 @@ from standoff.simulation.covers import make_cover
 from standoff.simulation.flight import drone_camera, make_flight
 from standoff.simulation.layout import lay_out
 from standoff.simulation.light import level_luminance, random_light
+from standoff.simulation.mesh import translation
 from standoff.simulation.presets import Plan, Preset
 from standoff.simulation.props.clutter import CLUTTER
 from standoff.simulation.props.fences import make_fence
@@ -21,7 +23,7 @@ from standoff.simulation.props.heaps import scatter_litter
 from standoff.simulation.props.plant import PLANT
 from standoff.simulation.reference import board_corners_m, make_reference
 from standoff.simulation.render import Look
-from standoff.simulation.scene import PARKED, Batch, Flight, Ground, Light, Reference, Scene
+from standoff.simulation.scene import PARKED, Batch, Flight, Ground, Light, Reference, Scene, moved
 from standoff.simulation.sensor import Sensor
 from standoff.simulation.site_plans import SiteStyle, random_plan
 from standoff.simulation.surroundings import make_surroundings
@@ -37,6 +39,21 @@ _PROPS_WITHIN_M = 45.0
 _REFERENCE_ID = 1000
 """Of the reference object, far from the actors'."""
 _FIRST_PARKED_ID = 2000
+_BARE = 0.3
+"""Clutter below which a site has no crane."""
+_CRANE_SHARE = 0.5
+_CRANE_TRIES = 12
+_CRANE_FOOT_M = 4.2
+_JIB_AWAY_M = 9.0
+_METERED = (0.15, 0.26)
+"""Linear picture value of level ground in the open; clutter and shadows are darker."""
+_METER_ALBEDO = 0.23
+"""Of ground that is exposed to the letter; darker soils stay a little darker, pale ones paler."""
+_DEHAZED = 0.7
+_DEEPEST_BLACK = 0.16
+"""Linear picture value that an automatic black level goes up to."""
+_DARKEST = 0.25
+"""Level light below which the shutter cannot stay open longer."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,7 +87,7 @@ def build_site(plan: Plan) -> Site:
     """
     preset = plan.preset
     # a stream for each part: a change of one leaves the others as they were
-    names = ("cast", "ground", "reference", "props", "surroundings", "light", "camera", "flight", "look")
+    names = ("cast", "ground", "reference", "props", "surroundings", "light", "camera", "flight", "look", "crane")
     streams = np.random.SeedSequence(plan.seed).spawn(len(names))
     rng = {name: np.random.default_rng(stream) for name, stream in zip(names, streams, strict=True)}
 
@@ -90,7 +107,9 @@ def build_site(plan: Plan) -> Site:
     reference = _place_reference(rng["reference"], plan, reference_xy_m, heading_deg, ground)
     light = random_light(rng["light"], preset.condition)
     bed = shapely.Polygon() if reference is None else shapely.Polygon(reference.base_m[:, :2])
-    props = _furnish(rng["props"], preset, cast, bed, _furnished(plan, flight), ground)
+    clear = [*cast.ways, bed.buffer(_REFERENCE_CLEAR_M)]
+    crane, foot = _raise_crane(rng["crane"], preset, clear, flight, ground, light)
+    props = crane + _furnish(rng["props"], preset, [*clear, foot], bed, _furnished(plan, flight), ground)
     props += _fence_in(rng["props"], ground)
     shade = light.to_sun if rng["surroundings"].random() < 0.35 else None
     outside, parked = _number_parked(make_surroundings(rng["surroundings"], ground, shade_to_sun=shade))
@@ -98,7 +117,7 @@ def build_site(plan: Plan) -> Site:
     return Site(
         Scene(plan.name, plan.seed, ground, props, tuple(cast.actors), parked, reference, light, flight),
         camera,
-        _develop(rng["look"], light),
+        _develop(rng["look"], light, ground, preset.altitude_m / np.sin(np.deg2rad(preset.pitch_deg))),
         Sensor.draw(rng["look"], preset.condition),
         1 / 60 if preset.condition == "dusk" else float(rng["look"].choice([1 / 240, 1 / 500, 1 / 1000])),
         duration_s,
@@ -111,12 +130,13 @@ def _shape_ground(rng: np.random.Generator, preset: Preset, cast: Cast, referenc
     if preset.shape is not None:
         radius_m = 20.0 if preset.shape == "board" else _REFERENCE_CLEAR_M
         patches.append(FlatPatch(_pair(reference_xy_m), radius_m))
-    for way in (*cast.machines_way, *cast.peoples_way):
+    ways = (*cast.machines_way, *cast.peoples_way)
+    for way in ways:
         centre_m = np.clip([way.centroid.x, way.centroid.y], -50.0, 50.0)
         radius_m = float(np.clip(shapely.minimum_bounding_radius(way), 1.5, 14.0))
         patches.append(FlatPatch(_pair(centre_m), radius_m, firmness=0.5))
     extent_m = (_EXTENT_M, _EXTENT_M)
-    plan = random_plan(rng, SiteStyle(preset.style), patches=patches, extent_m=extent_m)
+    plan = random_plan(rng, SiteStyle(preset.style), patches=patches, ways=ways, extent_m=extent_m)
     if preset.soil is not None:
         plan = replace(plan, soil=Soil(preset.soil))
     return make_terrain(rng, plan)
@@ -160,13 +180,39 @@ def _furnished(plan: Plan, flight: Flight) -> tuple[float, float, float, float]:
     return float(low[0]), float(low[1]), float(high[0]), float(high[1])
 
 
+def _raise_crane(
+    rng: np.random.Generator, preset: Preset, clear: Sequence[shapely.Polygon], flight: Flight, ground: Ground,
+    light: Light,
+) -> tuple[tuple[Batch, ...], shapely.Polygon]:  # fmt: skip
+    """Put up a tower crane on some sites, so that its shadow falls across the work; return it and the ground it takes.
+
+    Its mast never stands between the camera and the middle of the site, and the jib keeps away from the camera.
+    """
+    nothing = (), shapely.Polygon()
+    if preset.clutter < _BARE or preset.shape == "board" or rng.random() > _CRANE_SHARE:
+        return nothing
+    camera = shapely.Point(flight.view(0.0).position_m[:2])
+    sight = shapely.LineString([camera, (0.0, 0.0)]).buffer(_CRANE_FOOT_M)
+    sunward = light.to_sun[:2] / max(float(np.linalg.norm(light.to_sun[:2])), 1e-6)
+    for _ in range(_CRANE_TRIES):
+        xy_m = rng.uniform(-8.0, 8.0, 2) + sunward * rng.uniform(8.0, 38.0)
+        foot = shapely.Point(xy_m).buffer(_CRANE_FOOT_M)
+        if foot.intersects(shapely.union_all([sight, *clear])):
+            continue
+        pose = translation(float(xy_m[0]), float(xy_m[1]), float(ground.height_at(xy_m[None]).min()))
+        crane = moved(PLANT["crane"].make(rng), pose)
+        jib = shapely.LineString([(crane[2].poses[0] @ (x_m, 0.0, 0.0, 1.0))[:2] for x_m in (-14.0, 49.0)])
+        if jib.distance(camera) > _JIB_AWAY_M:
+            return crane, foot
+    return nothing
+
+
 def _furnish(
-    rng: np.random.Generator, preset: Preset, cast: Cast, bed: shapely.Polygon,
+    rng: np.random.Generator, preset: Preset, clear: Sequence[shapely.Polygon], bed: shapely.Polygon,
     extent_m: tuple[float, float, float, float], ground: Ground,
 ) -> tuple[Batch, ...]:  # fmt: skip
     """Lay out clutter, away from everybody's ways and from the reference object's bed."""
-    families = [*CLUTTER, *PLANT.values()]
-    clear = [*cast.ways, bed.buffer(_REFERENCE_CLEAR_M)]
+    families = [*CLUTTER, *(prop for prop in PLANT.values() if prop.name != "crane")]
     laid = lay_out(rng, families, _COVERED_SHARE * preset.clutter, clear, extent_m, ground)
     region = shapely.box(*extent_m) - bed.buffer(0.1)
     return laid + scatter_litter(rng, int(0.5 * preset.clutter * region.area), region, ground.height_at)
@@ -191,13 +237,30 @@ def _number_parked(batches: tuple[Batch, ...]) -> tuple[tuple[Batch, ...], tuple
     return tuple(batch for batch in batches if batch.entity_id != PARKED), numbered
 
 
-def _develop(rng: np.random.Generator, light: Light) -> Look:
-    """Draw a way of exposing and developing: from washed out to hard, warm to cold."""
+def _develop(rng: np.random.Generator, light: Light, ground: Terrain, away_m: float) -> Look:
+    """Draw a way of exposing and developing, as drones do by themselves: the meter holds the ground near middle grey.
+
+    What haze adds over the distance to the ground is mostly taken off again, as by cameras' automatic black level.
+    """
+    level = max(level_luminance(light), _DARKEST)
+    clear = float(np.exp(-light.haze_per_m * away_m))
+    veil = (1.0 - _DEHAZED) * (1.0 - clear)
+    albedo = _METER_ALBEDO + 0.6 * (_ground_luminance(ground) - _METER_ALBEDO)
+    exposure = float(np.clip(rng.uniform(*_METERED) / (clear * albedo + veil), 0.6, 1.9))
+    warmth, tint = rng.normal(0.0, 0.03), rng.normal(0.0, 0.01)
     return Look(
-        exposure=float(0.9 / max(level_luminance(light), 0.25) * rng.uniform(0.85, 1.25)),
-        contrast=float(rng.uniform(0.82, 1.15)),
-        lift=float(rng.uniform(0.0, 0.03)),
-        saturation=float(rng.uniform(0.6, 1.1)),
-        white_balance=(float(rng.normal(1.0, 0.03)), 1.0, float(rng.normal(1.0, 0.04))),
+        exposure=exposure / level,
+        contrast=float(rng.uniform(0.95, 1.25)),
+        lift=float(min(rng.exponential(0.004), 0.02)) - min(_DEHAZED * (1.0 - clear) * exposure, _DEEPEST_BLACK),
+        saturation=float(rng.uniform(0.75, 1.15)),
+        white_balance=(float(1.0 + warmth), float(1.0 + tint), float(1.0 - warmth)),
         vignette=float(rng.uniform(0.0, 0.2)),
     )
+
+
+def _ground_luminance(ground: Terrain) -> float:
+    """Return the mean albedo of what the camera sees most of, dark where it is wet."""
+    rows, columns = ground.wetness.shape
+    middle = np.s_[rows // 4 : 3 * rows // 4 : 8, columns // 4 : 3 * columns // 4 : 8]
+    linear = (ground.albedo[middle] / 255.0) ** 2.2 @ np.array([0.2126, 0.7152, 0.0722])
+    return float(np.mean(linear * (1.0 - 0.58 * (ground.wetness[middle] / 255.0))))

@@ -14,7 +14,7 @@ from standoff.core.homography import FloatArray
 from standoff.simulation.terrain_plan import FlatPatch, Heap, Path, Pit, Slab, Soil, TerrainPlan
 
 _MARGIN_M = 6.0
-_PATCH_MARGIN_M = 1.0
+_KEPT_MARGIN_M = 1.0
 _TRIES = 12
 
 
@@ -57,7 +57,7 @@ class _Sketch:
 
 def random_plan(
     rng: np.random.Generator, style: SiteStyle | None = None, *, patches: Sequence[FlatPatch] = (),
-    extent_m: tuple[float, float] = (120.0, 120.0),
+    ways: Sequence[shapely.Geometry] = (), extent_m: tuple[float, float] = (120.0, 120.0),
 ) -> TerrainPlan:  # fmt: skip
     """Draw a ground for a kind of site.
 
@@ -65,11 +65,13 @@ def random_plan(
         rng: Source of chance.
         style: Of the site; None draws one.
         patches: Level ground that the plan shall have; nothing is dug, heaped or cast on it.
+        ways: Where machines and people go; nothing is dug, heaped or cast there either.
         extent_m: East-west and north-south size.
     """
     styles = list(SiteStyle)
     style = style or styles[int(rng.choice(len(styles), p=[0.28, 0.24, 0.2, 0.14, 0.14]))]
-    kept = [shapely.Point(patch.centre_m).buffer(patch.radius_m + _PATCH_MARGIN_M) for patch in patches]
+    kept = [shapely.Point(patch.centre_m).buffer(patch.radius_m + _KEPT_MARGIN_M) for patch in patches]
+    kept += [way.buffer(_KEPT_MARGIN_M) for way in ways]
     sketch = _Sketch(rng, np.array(extent_m) / 2, shapely.union_all(kept))
     # Most sites lie along their streets; along the height samples, too, walls of pits are straight.
     turn_deg = float(rng.uniform(0.0, 90.0)) if rng.random() < 0.2 else 0.0

@@ -34,14 +34,14 @@ def paint_ground(
     prints = draw_prints(rng, canvas, plan)
     tone = _tone(rng, plan, lows, wet, canvas)
     grain = fractal(rng, canvas.shape, 512, 2048, gain=0.9)
-    lively = cv2.resize(10.0 + 7.0 * np.clip(fractal(rng, coarse.shape, 6, 96), -1.0, 1.5), canvas.shape[::-1])
+    lively = cv2.resize(6.0 + 5.5 * np.clip(fractal(rng, coarse.shape, 6, 96), -1.0, 1.5), canvas.shape[::-1])
     tone += grain * lively
     tone += _pebbles(rng, canvas, plan)
     faded = cv2.resize(np.clip(0.85 + 0.6 * fractal(rng, coarse.shape, 8, 64), 0.0, 1.5), canvas.shape[::-1])
     tone += cv2.subtract(prints, 128.0, dtype=cv2.CV_32F) * faded
     levels = cv2.convertScaleAbs(np.maximum(tone, 0.0))
     albedo = _soils(rng, plan, coarse, levels, grain)
-    _grow(rng, plan, coarse, levels, albedo)
+    albedo = _grow(rng, plan, coarse, levels, grain, albedo)
     _drift(rng, albedo)
     paint_blots(rng, canvas, levels, albedo)
     paint_slabs(rng, canvas, plan.slabs, albedo)
@@ -84,7 +84,7 @@ def _tone(
     """Return brightness, about 0..255: dry highs pale, lows and wet ground dark, roads pale and even."""
     shape = (lows.shape[0], lows.shape[1])
     tone = (165.0 - 35.0 * plan.moisture) + 13.0 * fractal(rng, shape, 3, 48, gain=0.75)
-    tone += 9.0 * fractal(rng, shape, 64, 512, gain=0.8)
+    tone += 6.5 * fractal(rng, shape, 64, 512, gain=0.8)
     for _ in range(2):
         graded = np.clip(0.4 + fractal(rng, shape, 4, 32), 0.0, 1.3)
         tone += 12.0 * graded * _streaks(rng, shape)
@@ -97,7 +97,7 @@ def _tone(
         tone += share * (20.0 - 0.45 * (tone - 150.0))
     tone -= 130.0 * lows
     # The renderer darkens wet ground; only its mud, washed free of pale dust, is darker by itself.
-    tone -= 25.0 * wet
+    tone -= 14.0 * wet
     return np.asarray(cv2.resize(tone, canvas.shape[::-1], interpolation=cv2.INTER_LINEAR), np.float32)
 
 
@@ -114,7 +114,7 @@ def _streaks(rng: np.random.Generator, shape: tuple[int, int]) -> Float32Array:
 def _pebbles(rng: np.random.Generator, canvas: Canvas, plan: TerrainPlan) -> Float32Array:
     """Return bright and dark specks, a texel or two wide: stones, clods and their shadows."""
     heavy = np.clip((np.arange(256) - 127.5) / 127.5, -1.0, 1.0)
-    gravelly = 1.0 if plan.soil is Soil.GREY_GRAVEL else 0.6
+    gravelly = 0.6 if plan.soil is Soil.GREY_GRAVEL else 0.45
     spread = (128.0 + gravelly * 95.0 * np.sign(heavy) * np.abs(heavy) ** 9).astype(np.uint8)
     white = np.frombuffer(rng.bytes(canvas.width_px * canvas.height_px), np.uint8).reshape(canvas.shape)
     return np.asarray(cv2.subtract(cv2.LUT(white, spread), 128.0, dtype=cv2.CV_32F), np.float32)
@@ -166,10 +166,12 @@ def _lay(albedo: Picture, levels: Picture, palette: Picture, mask: Picture, wind
     albedo[window] = cv2.copyTo(coloured, mask, np.ascontiguousarray(albedo[window]))
 
 
-def _grow(rng: np.random.Generator, plan: TerrainPlan, coarse: Canvas, levels: Picture, albedo: Picture) -> None:
+def _grow(
+    rng: np.random.Generator, plan: TerrainPlan, coarse: Canvas, levels: Picture, grain: Float32Array, albedo: Picture
+) -> Picture:
     """Let grass in from the borders, and weeds into a few places inside; never on roads, tracks, slabs or pits."""
     if plan.grass <= 0.0:
-        return
+        return albedo
     inwards_m = (
         np.minimum.outer(*(np.minimum(np.arange(n), np.arange(n)[::-1]) for n in coarse.shape)) / coarse.px_per_m
     )
@@ -182,13 +184,14 @@ def _grow(rng: np.random.Generator, plan: TerrainPlan, coarse: Canvas, levels: P
     coarse.draw(worn, lines, 255, 3.2)
     coarse.fill(worn, [*(pit.outline_m for pit in plan.pits), *(slab.outline_m for slab in plan.slabs)], 255)
     rich -= cv2.blur(worn, (9, 9)) * np.float32(2.5 / 255.0)
-    mask = cv2.resize(cv2.compare(np.asarray(rich, np.float32), 0.35, cv2.CMP_GT), levels.shape[::-1])
+    # Tufts are thick in the middle of a patch and thin out into single ones, with soil showing between them.
+    thick = cv2.resize(np.asarray(rich, np.float32), levels.shape[::-1], interpolation=cv2.INTER_CUBIC)
+    thick = np.clip(cv2.scaleAdd(grain, 0.35, thick) * 0.7 - 0.1, 0.0, 1.0)
     health = fractal(rng, coarse.shape, 6, 512, gain=0.75)
-    blades = cv2.addWeighted(
-        levels, 0.55, cv2.resize(cv2.convertScaleAbs(health * 30.0 + 96.0), levels.shape[::-1]), 0.6, 0.0
-    )
+    height = cv2.resize(cv2.convertScaleAbs(health * 26.0 + 96.0), levels.shape[::-1])
+    blades = cv2.convertScaleAbs(cv2.scaleAdd(grain, 16.0, cv2.addWeighted(levels, 0.35, height, 0.7, 0.0, dtype=5)))
     green = cv2.applyColorMap(blades, PALETTES["grass" if rng.random() < 0.6 else "dead grass"])
-    cv2.copyTo(green, cv2.compare(mask, 127, cv2.CMP_GT), albedo)
+    return np.asarray(cv2.blendLinear(green, albedo, thick, 1.0 - thick), np.uint8)
 
 
 def _drift(rng: np.random.Generator, albedo: Picture) -> None:

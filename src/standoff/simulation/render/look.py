@@ -14,7 +14,7 @@ class Look:
     Attributes:
         exposure: Factor on light: at 1 a white card in full sun is just below white.
         contrast: Slope of the tone curve around middle grey: 1 natural, 0.85 washed out, 1.2 hard.
-        lift: Linear value that black becomes (veiling glare): 0 to about 0.04.
+        lift: Linear value that black becomes: veiling glare up to about 0.04; below 0 as much is taken for black.
         saturation: 0 grey, 1 natural.
         white_balance: Factors on linear red, green, blue.
         vignette: Share of light lost in the corners.

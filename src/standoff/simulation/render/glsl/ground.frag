@@ -26,19 +26,25 @@ void main() {
     float wet = base.a * (1.0 - far);
     vec4 fine = texture(noise, xy * 0.29);
     vec4 broad = texture(noise, mat2(0.81, 0.59, -0.59, 0.81) * xy * 0.043);
-    float puddle = smoothstep(0.72, 0.9, wet + 0.15 * (broad.r - 0.5));
+    float puddle = smoothstep(0.78, 0.88, wet + 0.12 * (broad.r - 0.5));
     float rough = 1.0 - puddle;
-    albedo *= 1.0 + rough * (1.1 * (fine.r - 0.5) + 0.55 * (broad.r - 0.5));
-    float stone = fine.g * smoothstep(0.35, 0.75, broad.g + broad.r);
-    vec3 stony = mix(albedo, vec3(dot(albedo, vec3(0.3, 0.5, 0.2))), 0.6) * (0.9 + 0.9 * fine.r);
-    albedo = mix(albedo, stony, 0.55 * stone * rough);
-    albedo *= mix(1.0, 0.42, smoothstep(0.05, 0.7, wet));
+    // Trodden and rolled places are smoother than loose ones; grass is the roughest of all.
+    float loose = smoothstep(0.3, 0.75, broad.r);
+    float leafy = clamp(16.0 * (albedo.g - albedo.r), 0.0, 1.0);
+    albedo *= 1.0 + rough * (mix(0.3 + 0.4 * loose, 1.5, leafy) * (fine.r - 0.5) + 0.4 * (broad.r - 0.5));
+    float stone = fine.g * smoothstep(0.45, 0.85, broad.g + broad.r) * (1.0 - leafy);
+    vec3 stony = mix(albedo, vec3(dot(albedo, vec3(0.3, 0.5, 0.2))), 0.5) * (0.85 + 0.6 * fine.r);
+    albedo = mix(albedo, stony, 0.4 * stone * rough);
+    // Wet soil is darker and fuller in colour; how far it creeps up differs from clod to clod.
+    float damp = smoothstep(0.05, 0.75, wet + 0.25 * rough * (fine.r + broad.b - 1.0) * smoothstep(0.0, 0.1, wet));
+    albedo = mix(albedo, albedo * (0.22 + 1.3 * albedo), damp);
     vec2 slope = texture(slopes, (clamp(place, 0.0, 1.0) * (samples - 1.0) + 0.5) / samples).rg;
     vec3 level = normalize(vec3(-slope, 1.0));
     vec3 normal = level;
-    normal = normalize(normal - rough * vec3(1.5 * (fine.ba - 0.5), 0.0));
+    normal = normalize(normal - rough * vec3((0.7 + 0.6 * loose) * (fine.ba - 0.5), 0.0));
     normal = normalize(mix(normal, vec3(0.0, 0.0, 1.0), puddle));
-    float roughness = mix(mix(0.95, 0.45, smoothstep(0.2, 0.8, wet)), 0.07, puddle);
+    // Between mud and water there is nothing half as smooth: its broad gleam would draw a white line along the shore.
+    float roughness = puddle > 0.5 ? 0.07 : mix(0.95, 0.68, smoothstep(0.2, 0.8, wet));
     float open = texture(openness, gl_FragCoord.xy * openness_scale).r;
     float lit = dot(normal, to_sun) > 0.0 ? sunlit(offset, level, true) : 0.0;
     vec3 light = shade(clamp(albedo, 0.0, 0.9), normal, to_eye, roughness, 0.0, lit, open);
