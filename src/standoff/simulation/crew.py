@@ -105,5 +105,5 @@ def _work(factory: Factory[Job, Result], line: Connection, threads: int) -> None
                 line.send(worker(line.recv()))
     except StandoffError as error:
         line.send(error)
-    except (EOFError, KeyboardInterrupt):
+    except (EOFError, BrokenPipeError, KeyboardInterrupt):
         return

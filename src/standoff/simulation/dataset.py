@@ -260,13 +260,14 @@ def _shoot(
 def _vary(rng: np.random.Generator, look: Look) -> Look:
     """Develop one picture of a scene otherwise than the next: exposure, tone, colour, glare."""
     red, green, blue = look.white_balance
+    warmth = rng.normal(0.0, 0.03)
     return replace(
         look,
         exposure=look.exposure * float(2.0 ** np.clip(rng.normal(0.0, 0.3), -0.6, 0.6)),
-        contrast=look.contrast * float(rng.uniform(0.95, 1.3)),
+        contrast=look.contrast * float(rng.uniform(0.9, 1.2)),
         lift=look.lift + float(min(rng.exponential(0.003), 0.03)),
-        saturation=look.saturation * float(rng.uniform(0.9, 1.35)),
-        white_balance=(red * float(rng.normal(1.0, 0.03)), green, blue * float(rng.normal(1.0, 0.04))),
+        saturation=look.saturation * float(rng.uniform(0.85, 1.25)),
+        white_balance=(red * float(1.0 + warmth), green * float(rng.normal(1.0, 0.008)), blue * float(1.0 - warmth)),
     )
 
 

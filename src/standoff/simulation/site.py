@@ -45,14 +45,14 @@ _CRANE_SHARE = 0.5
 _CRANE_TRIES = 12
 _CRANE_FOOT_M = 4.2
 _JIB_AWAY_M = 9.0
-_METERED = (0.15, 0.26)
+_METERED = (0.18, 0.29)
 """Linear picture value of level ground in the open; clutter and shadows are darker."""
 _METER_ALBEDO = 0.23
 """Of ground that is exposed to the letter; darker soils stay a little darker, pale ones paler."""
 _DEHAZED = 0.7
 _DEEPEST_BLACK = 0.16
 """Linear picture value that an automatic black level goes up to."""
-_DARKEST = 0.25
+_DARKEST = 0.17
 """Level light below which the shutter cannot stay open longer."""
 
 
@@ -242,11 +242,11 @@ def _develop(rng: np.random.Generator, light: Light, ground: Terrain, away_m: fl
 
     What haze adds over the distance to the ground is mostly taken off again, as by cameras' automatic black level.
     """
-    level = max(level_luminance(light), _DARKEST)
+    level = level_luminance(light)
     clear = float(np.exp(-light.haze_per_m * away_m))
     veil = (1.0 - _DEHAZED) * (1.0 - clear)
     albedo = _METER_ALBEDO + 0.6 * (_ground_luminance(ground) - _METER_ALBEDO)
-    exposure = float(np.clip(rng.uniform(*_METERED) / (clear * albedo + veil), 0.6, 1.9))
+    exposure = float(np.clip(rng.uniform(*_METERED) / (clear * albedo + veil), 0.6, 1.9)) * min(level / _DARKEST, 1.0)
     warmth, tint = rng.normal(0.0, 0.03), rng.normal(0.0, 0.01)
     return Look(
         exposure=exposure / level,

@@ -176,7 +176,7 @@ def _grow(
         np.minimum.outer(*(np.minimum(np.arange(n), np.arange(n)[::-1]) for n in coarse.shape)) / coarse.px_per_m
     )
     rich = 1.0 - inwards_m / (_GRASS_M * plan.grass) + 0.9 * fractal(rng, coarse.shape, 4, 64)
-    rich = np.maximum(rich, fractal(rng, coarse.shape, 16, 128) - 3.2 + plan.grass) + 0.8 * fractal(
+    rich = np.maximum(rich, fractal(rng, coarse.shape, 16, 128) - 3.2 + plan.grass) + 0.5 * fractal(
         rng, coarse.shape, 256, 1024, gain=0.9
     )
     worn = np.zeros(coarse.shape, np.uint8)
@@ -186,10 +186,10 @@ def _grow(
     rich -= cv2.blur(worn, (9, 9)) * np.float32(2.5 / 255.0)
     # Tufts are thick in the middle of a patch and thin out into single ones, with soil showing between them.
     thick = cv2.resize(np.asarray(rich, np.float32), levels.shape[::-1], interpolation=cv2.INTER_CUBIC)
-    thick = np.clip(cv2.scaleAdd(grain, 0.35, thick) * 0.7 - 0.1, 0.0, 1.0)
+    thick = np.clip(cv2.scaleAdd(grain, 0.4, thick) * 0.6 - 0.05, 0.0, 0.85)
     health = fractal(rng, coarse.shape, 6, 512, gain=0.75)
-    height = cv2.resize(cv2.convertScaleAbs(health * 26.0 + 96.0), levels.shape[::-1])
-    blades = cv2.convertScaleAbs(cv2.scaleAdd(grain, 16.0, cv2.addWeighted(levels, 0.35, height, 0.7, 0.0, dtype=5)))
+    height = cv2.resize(cv2.convertScaleAbs(health * 16.0 + 122.0), levels.shape[::-1])
+    blades = cv2.convertScaleAbs(cv2.scaleAdd(grain, 20.0, cv2.addWeighted(levels, 0.35, height, 0.7, 0.0, dtype=5)))
     green = cv2.applyColorMap(blades, PALETTES["grass" if rng.random() < 0.6 else "dead grass"])
     return np.asarray(cv2.blendLinear(green, albedo, thick, 1.0 - thick), np.uint8)
 

@@ -21,10 +21,15 @@ void main() {
     vec2 folded = 1.0 - abs(fract(0.5 * place) * 2.0 - 1.0);
     vec2 outside = max(abs(place - 0.5) - 0.5, 0.0) * extent.zw;
     float far = 1.0 - exp(-0.02 * (outside.x + outside.y));
-    vec4 base = texture(picture, folded, 6.0 * far);
+    vec2 slope = texture(slopes, (clamp(place, 0.0, 1.0) * (samples - 1.0) + 0.5) / samples).rg;
+    vec3 level = normalize(vec3(-slope, 1.0));
+    float steep = 1.0 - smoothstep(0.5, 0.9, level.z);
+    // A picture from above is drawn out to straw on walls: there it is blurred, and the noise runs down the wall.
+    vec4 base = texture(picture, folded, 6.0 * far + 3.5 * steep);
     vec3 albedo = base.rgb * base.rgb;
     float wet = base.a * (1.0 - far);
-    vec4 fine = texture(noise, xy * 0.29);
+    vec2 draped = xy + steep * (origin.z + offset.z) * normalize(slope + vec2(1e-4, 0.0));
+    vec4 fine = texture(noise, draped * 0.29);
     vec4 broad = texture(noise, mat2(0.81, 0.59, -0.59, 0.81) * xy * 0.043);
     float puddle = smoothstep(0.78, 0.88, wet + 0.12 * (broad.r - 0.5));
     float rough = 1.0 - puddle;
@@ -38,8 +43,6 @@ void main() {
     // Wet soil is darker and fuller in colour; how far it creeps up differs from clod to clod.
     float damp = smoothstep(0.05, 0.75, wet + 0.25 * rough * (fine.r + broad.b - 1.0) * smoothstep(0.0, 0.1, wet));
     albedo = mix(albedo, albedo * (0.22 + 1.3 * albedo), damp);
-    vec2 slope = texture(slopes, (clamp(place, 0.0, 1.0) * (samples - 1.0) + 0.5) / samples).rg;
-    vec3 level = normalize(vec3(-slope, 1.0));
     vec3 normal = level;
     normal = normalize(normal - rough * vec3((0.7 + 0.6 * loose) * (fine.ba - 0.5), 0.0));
     normal = normalize(mix(normal, vec3(0.0, 0.0, 1.0), puddle));
