@@ -241,6 +241,7 @@ def test_a_shifted_straight_path_keeps_its_distance(offset_m: float, turn: float
 def test_nothing_is_dug_heaped_or_cast_where_somebody_goes(style: SiteStyle, seed: int) -> None:
     way = shapely.LineString([(-40.0, -20.0), (0.0, 5.0), (35.0, 30.0)]).buffer(2.0)
     plan = random_plan(np.random.default_rng(seed), style, ways=[way])
-    dug = [shapely.Polygon(thing.outline_m) for thing in (*plan.pits, *plan.slabs)]
+    outlines = [*(pit.outline_m for pit in plan.pits), *(slab.outline_m for slab in plan.slabs)]
+    dug = [shapely.Polygon(outline) for outline in outlines]
     heaped = [shapely.Point(heap.centre_m).buffer(0.9 * heap.radius_m) for heap in plan.heaps]
     assert not any(shape.intersects(way) for shape in dug + heaped)
