@@ -74,10 +74,12 @@ def test_corners_turn_with_the_picture(seed: int, quarters: int) -> None:
 
 
 @settings(max_examples=15, deadline=None)
-@given(st.floats(0.5, 1.3), st.integers(0, 20), st.booleans(), st.integers(0, 5))
-def test_corners_stay_where_light_changes_or_is_inverted(gain: float, level: int, inverted: bool, seed: int) -> None:
+@given(st.floats(0.5, 1.0), st.integers(0, 20), st.booleans(), st.integers(0, 5))
+def test_corners_stay_where_light_changes_or_is_inverted(share: float, level: int, inverted: bool, seed: int) -> None:
     scene = draw_scene("clean", seed)
-    lit = np.clip(np.rint(scene.gray * gain + level), 0, 255).astype(np.uint8)
+    # up to white but not beyond: where the bright side saturates, its edge really moves outwards
+    gain = share * (255 - level) / float(scene.gray.max())
+    lit = np.rint(scene.gray * gain + level).astype(np.uint8)
     gray = 255 - lit if inverted else lit
     errors, _ = corner_errors(found("oriented", gray, scene.box_xyxy_px), scene.corners_px)
     assert np.linalg.norm(errors, axis=1).max() < WORST_PX["oriented"]
