@@ -86,7 +86,7 @@ PRESETS: Mapping[str, Preset] = MappingProxyType(
         "mobile": Preset(
             "The paper's mobile test: worker, loader and excavator about a 2.89 m footing, sand on it for a while.",
             "mobile", width_px=3840, height_px=2140, frames=398, soil="brown earth", condition="overcast",
-            covers=(CoverPlan("sand_side", 0.42, 0.53),),
+            covers=(CoverPlan("sand_side", 0.40, 0.56),),
         ),
         "stationary-15": Preset(
             "The paper's stationary test: worker and excavator exactly 15 m apart, quadrilateral footing, hand-held.",
