@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Iterator
 
@@ -27,14 +26,8 @@ CORNERS = np.array([[x, y, z] for x in (-1.5, 1.5) for y in (-1.0, 1.0) for z in
 
 
 @pytest.fixture(scope="module")
-def renderer() -> Iterator[Renderer]:
-    try:
-        made = Renderer((320, 240))
-    except MissingDependency as missing:
-        if os.environ.get("STANDOFF_REQUIRE_EGL") == "1":
-            raise
-        pytest.skip(str(missing))
-    with made:
+def renderer(opengl: None) -> Iterator[Renderer]:
+    with Renderer((320, 240)) as made:
         made.load(FlatGround(), ())
         yield made
 

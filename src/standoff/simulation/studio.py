@@ -57,7 +57,7 @@ class Studio:
 
     def close(self) -> None:
         """Free the renderer."""
-        self._renderer.__exit__(None, None, None)
+        self._renderer.release()
 
     def show(self, site: Site) -> None:
         """Show another site, or the same with another camera, in pictures of the same size."""
