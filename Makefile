@@ -1,5 +1,5 @@
+# make demo   the whole monitor on a film that comes with it; installs the runtime only
 # make test   everything that CI checks
-# make demo   the main job on real footage, all set-up included
 # Both set themselves up on a fresh Debian or Ubuntu with python3 and make.
 
 SHELL := /bin/bash
@@ -14,20 +14,29 @@ SHARED ?= ../shared/data
 YOLO := $(SHARED)/weights/yolo-fastest-1.1-xl/yolo-fastest-1.1-xl
 WORKERS ?= 2
 
-.PHONY: help setup test lint types contracts unit demo docs bench lock clean
+DEMO_VENV := .venv-demo
+SOURCES := $(shell find src -type f -not -path '*/__pycache__/*')
+
+.PHONY: help setup test lint types contracts unit demo demo-clean demo-pets docs bench lock clean
 
 help:
 	@sed -n 's/^# make/make/p' Makefile
+
+# An empty virtual environment in $(1); with the venv module from apt where Python comes without.
+define empty_venv
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	  { echo "standoff needs Python 3.11 or newer; found $$($(PYTHON) --version). Set PYTHON=/path/to/python3.11."; exit 2; }
+	@test -x $(1)/bin/python && $(1)/bin/python -m pip --version >/dev/null 2>&1 || \
+	  $(PYTHON) -m venv --clear $(1) || $(MAKE) --no-print-directory venv-by-apt VENV=$(1)
+	$(1)/bin/python -m pip install --quiet --upgrade pip
+endef
 
 setup: $(READY)
 
 # The lock fixes every version; the test oracles come without their dependencies, because those would
 # bring a second OpenCV that overwrites the headless one.
 $(READY): pyproject.toml requirements.lock requirements-oracles.txt
-	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
-	  { echo "standoff needs Python 3.11 or newer; found $$($(PYTHON) --version). Set PYTHON=/path/to/python3.11."; exit 2; }
-	@test -x $(BIN)/python && $(BIN)/python -m pip --version >/dev/null 2>&1 || $(PYTHON) -m venv --clear $(VENV) || $(MAKE) --no-print-directory venv-by-apt
-	$(BIN)/python -m pip install --quiet --upgrade pip
+	$(call empty_venv,$(VENV))
 	$(BIN)/python -m pip install --quiet --constraint requirements.lock --editable '.[dev,train,sim]'
 	$(BIN)/python -m pip install --quiet --no-deps --requirement requirements-oracles.txt
 	@touch $@
@@ -59,17 +68,38 @@ bench: $(READY)
 docs: $(READY)
 	$(BIN)/mkdocs build --strict
 
-# The data may not be redistributed, so it is not here; the drawn site of examples/ needs none.
-demo: $(READY)
+# The runtime only, as `pip install standoff` gives it: no torch, no OpenGL, nothing of the tests.
+$(DEMO_VENV)/.ready: pyproject.toml requirements.lock $(SOURCES)
+	$(call empty_venv,$(DEMO_VENV))
+	$(DEMO_VENV)/bin/python -m pip install --quiet --constraint requirements.lock .
+	@touch $@
+
+demo: $(DEMO_VENV)/.ready
+	$(DEMO_VENV)/bin/standoff demo --out demo --overwrite
+
+# The wheel alone in an empty environment, elsewhere: what it needs must be in it, and nothing else may be needed.
+demo-clean:
+	folder=$$(mktemp -d); trap 'rm -rf "$$folder"' EXIT; \
+	$(PYTHON) -m venv "$$folder/venv"; \
+	"$$folder/venv/bin/python" -m pip wheel --quiet --no-deps --wheel-dir "$$folder" .; \
+	"$$folder/venv/bin/python" -m pip install --quiet --constraint requirements.lock "$$folder"/standoff-*.whl; \
+	cd "$$folder"; env -i HOME="$$folder" venv/bin/standoff demo --out out --json found.json; \
+	venv/bin/python -c 'import importlib.util as u, json; found = json.load(open("found.json")); \
+	  extra = [n for n in ("torch", "onnx", "moderngl", "trimesh", "pycocotools") if u.find_spec(n)]; \
+	  missed = [one["kind"] for one in found["encounters"] if not one["recognised"]]; \
+	  assert (extra, missed, found["false_hazards"]) == ([], [], []), (extra, missed, found["false_hazards"])'
+
+# Real footage. It may not be redistributed, so it is not here.
+demo-pets: $(READY)
 	@test -f $(SHARED)/pets2009/vtest.avi && test -f $(YOLO).weights || \
-	  { echo "the demo needs pets2009/ and weights/ in $(SHARED); set SHARED=/path/to/data, or see examples/drawn_site"; exit 2; }
-	@mkdir -p demo
+	  { echo "demo-pets needs pets2009/ and weights/ in $(SHARED); set SHARED=/path/to/data, or use make demo"; exit 2; }
+	@mkdir -p demo-pets
 	$(BIN)/standoff export --cfg $(YOLO).cfg --weights $(YOLO).weights --names $(dir $(YOLO))coco.names \
-	  --size 768x576 --out demo/yolo-fastest.onnx
+	  --size 768x576 --out demo-pets/yolo-fastest.onnx
 	$(BIN)/standoff run $(SHARED)/pets2009/vtest.avi --config examples/pets2009/site.yaml \
-	  --model demo/yolo-fastest.onnx --out demo/run --overwrite
-	$(BIN)/standoff evaluate positions demo/run --truth $(SHARED)/pets2009/gt.csv --frames 1-219
-	@echo "open demo/run/report.html and demo/run/annotated.mp4"
+	  --model demo-pets/yolo-fastest.onnx --out demo-pets/run --overwrite
+	$(BIN)/standoff evaluate positions demo-pets/run --truth $(SHARED)/pets2009/gt.csv --frames 1-219
+	@echo "open demo-pets/run/report.html and demo-pets/run/annotated.mp4"
 
 lock: $(READY)
 	$(BIN)/python -m pip install --quiet pip-tools
@@ -78,4 +108,4 @@ lock: $(READY)
 	sed -i 's/+cpu$$//' requirements.lock
 
 clean:
-	rm -rf $(VENV) demo site .coverage .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(DEMO_VENV) demo demo-pets site .coverage .mypy_cache .ruff_cache .hypothesis

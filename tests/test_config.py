@@ -90,9 +90,16 @@ def test_a_settings_file_that_is_not_there_is_one_line(tmp_path: Path) -> None:
         load_settings(tmp_path / "none.yaml")
 
 
-def test_without_a_model_the_error_says_how_to_get_one() -> None:
-    with pytest.raises(ConfigError, match="standoff export"):
-        build_pipeline(load_settings(), frames=())
+def test_the_detector_is_the_shipped_one_unless_a_file_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "deep").mkdir()
+    (tmp_path / "far").mkdir()
+    assert load_settings().model == load_settings(overrides={"model": "site"}).model == "site"
+    assert load_settings(write(tmp_path / "deep", "model: site-int8\n")).model == "site-int8"
+    assert load_settings(overrides={"model": "./site"}).model == tmp_path / "site"
+    assert load_settings(write(tmp_path / "far", "model: site.onnx\n")).model == tmp_path / "far" / "site.onnx"
 
 
 def test_every_stage_can_be_replaced_by_name(tmp_path: Path) -> None:

@@ -10,7 +10,10 @@ import pytest
 
 PUBLIC_NAMES = {
     "standoff.stages.frames": {"ArrayPicture", "AvPicture", "Scaler", "Source", "frame_from_array", "open_source"},
-    "standoff.stages.detect": {"DEFAULT_CLASS_MAP", "DetectParams", "OnnxDetector", "available_providers"},
+    "standoff.stages.detect": {
+        "DEFAULT_CLASS_MAP", "SHIPPED_MODELS", "DetectParams", "OnnxDetector", "ShippedModel", "available_providers",
+        "find_model",
+    },
     "standoff.stages.track": {"TrackParams", "Tracker"},
     "standoff.stages.locate": {"LocateParams", "Locator"},
     "standoff.stages.proximity": {"ProximityMeter", "ProximityParams", "side_classes"},

@@ -14,6 +14,8 @@ import tolerances
 from training.conftest import DarknetFiles
 
 from standoff.training import export_darknet, yolov3_cfg, yolov3_tiny_cfg
+from standoff.training.architectures import ARCHITECTURES
+from standoff.training.architectures.yolov3 import YOLOV3_ANCHORS_PX
 
 Picture = npt.NDArray[np.uint8]
 Rows = npt.NDArray[np.float32]
@@ -74,6 +76,19 @@ def test_yolov3_tiny_decodes_as_in_opencv(
     make_darknet_files: Callable[[str, int], DarknetFiles], tmp_path: Path, size_px: tuple[int, int], seed: int
 ) -> None:
     files = make_darknet_files(yolov3_tiny_cfg(9, *size_px), seed)
+    worst = _worst_differences(files, _noise(size_px, seed), size_px, tmp_path)
+    assert worst.max() <= tolerances.DARKNET_DECODED
+
+
+@pytest.mark.parametrize("name", ["yolo-fastest-xl-8-16", "yolo-fastest-xl-8-16-32"])
+@pytest.mark.parametrize("seed", [0, 1])
+def test_yolo_fastest_with_a_stride_8_head_decodes_as_in_opencv(
+    make_darknet_files: Callable[[str, int], DarknetFiles], tmp_path: Path, name: str, seed: int
+) -> None:
+    size_px = (224, 160)
+    architecture = ARCHITECTURES[name]
+    anchors_px = YOLOV3_ANCHORS_PX[: len(architecture.strides)]
+    files = make_darknet_files(architecture.compose(7, *size_px, anchors_px), seed)
     worst = _worst_differences(files, _noise(size_px, seed), size_px, tmp_path)
     assert worst.max() <= tolerances.DARKNET_DECODED
 

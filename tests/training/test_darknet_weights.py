@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 import torch
 
-from standoff.core.errors import ModelError
+from standoff.core.errors import ModelError, OutputError
 from standoff.training.darknet_cfg import parse_cfg
 from standoff.training.darknet_network import DarknetNetwork
-from standoff.training.darknet_weights import WeightsHeader, load_weights, save_weights
+from standoff.training.darknet_weights import WeightsHeader, fill_convolutions, load_weights, read_numbers, save_weights
 
 CFG = """[net]
 width=8
@@ -99,6 +99,37 @@ def test_numbers_that_are_not_finite_say_in_which_layer(tmp_path: Path) -> None:
     path = _write(tmp_path / "a.weights", FIRST + SECOND, nan_at=FIRST + 1)
     with pytest.raises(ModelError, match=r"finite numbers in .* for layer 1"):
         load_weights(_network(), path)
+
+
+def test_a_negative_variance_says_that_the_weights_are_of_another_architecture(tmp_path: Path) -> None:
+    path = _write(tmp_path / "a.weights", FIRST + SECOND)
+    content = bytearray(path.read_bytes())
+    content[20 + 4 * 13 : 20 + 4 * 14] = struct.pack("<f", -0.5)
+    path.write_bytes(content)
+    with pytest.raises(ModelError, match=r"variances .* for layer 0, .*found -0\.5\. .*another architecture"):
+        load_weights(_network(), path)
+
+
+def test_weights_can_be_cut_after_a_layer_and_then_fill_a_part(tmp_path: Path) -> None:
+    source, target = _network(0), _network(1)
+    save_weights(source, tmp_path / "a.conv.0", cut_after_layer=0)
+    assert (tmp_path / "a.conv.0").stat().st_size == 20 + 4 * FIRST
+    with pytest.raises(ModelError, match=r"for layer 1, .*found 0 left"):
+        load_weights(target, tmp_path / "a.conv.0")
+    _, numbers = read_numbers(tmp_path / "a.conv.0")
+    assert fill_convolutions(target, numbers, "a.conv.0", may_end_early=True) == 1
+    (_, filled), _ = target.convolutions()
+    (_, expected), _ = source.convolutions()
+    assert torch.equal(filled.convolution.weight, expected.convolution.weight)
+
+
+def test_a_file_that_cannot_be_written_leaves_nothing_behind(tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match="No such file"):
+        save_weights(_network(), tmp_path / "nowhere" / "a.weights")
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(OutputError, match="found"):
+        save_weights(_network(), tmp_path / "folder")
+    assert list(tmp_path.iterdir()) == [tmp_path / "folder"]
 
 
 def test_a_missing_an_empty_and_a_cut_file_are_refused(tmp_path: Path) -> None:

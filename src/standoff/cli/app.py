@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from standoff import __version__
-from standoff.cli import bench, calibrate, config, doctor, evaluate, export, run, simulate
+from standoff.cli import bench, calibrate, config, demo, doctor, evaluate, export, label, quantize, run, simulate, train
 from standoff.core.errors import StandoffError
 
 app = typer.Typer(
@@ -20,11 +20,15 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.command("run")(run.run)
+app.command("train")(train.train)
 app.command("export")(export.export)
+app.command("quantize")(quantize.quantize)
+app.command("label")(label.label)
 app.command("calibrate")(calibrate.calibrate)
 app.add_typer(evaluate.app, name="evaluate")
 app.add_typer(config.app, name="config")
 app.add_typer(simulate.app, name="simulate")
+app.command("demo")(demo.demo)
 app.command("bench")(bench.bench)
 app.command("doctor")(doctor.doctor)
 

@@ -83,12 +83,9 @@ def check(file: Annotated[Path, typer.Argument(help="Settings, YAML.", show_defa
 
     settings = load_settings(file)
     for name in STAGE_NAMES:
-        if name == "detect" and settings.model is None and name not in settings.replace:
-            typer.echo(f"{file} names no model: pass --model to run.")
-        else:
-            stage = build_stage(name, settings)
-            for warning in ground_warnings(stage) if name == "ground" else ():
-                typer.echo(f"standoff: warning: {warning}", err=True)
+        stage = build_stage(name, settings)
+        for warning in ground_warnings(stage) if name == "ground" else ():
+            typer.echo(f"standoff: warning: {warning}", err=True)
     for replacement in settings.extra_outputs.values():
         import_factory(replacement)
     typer.echo(f"{file}: all settings are valid, and the files that they name can be used.")

@@ -7,13 +7,13 @@ from typing import Annotated
 
 import typer
 
-from standoff.cli import evaluate_paper
+from standoff.cli import evaluate_detection, evaluate_paper
 from standoff.cli.calibrate import pattern_size
-from standoff.cli.numbers import two_integers
-from standoff.core.errors import ConfigError
+from standoff.cli.numbers import frame_range
 
 app = typer.Typer(help="Measure accuracy on data with known truth.", no_args_is_help=True)
 app.command("paper")(evaluate_paper.paper)
+app.command("detection")(evaluate_detection.detection)
 _Json = Annotated[Path | None, typer.Option("--json", help="Also write the result as JSON; - prints only that.")]
 
 
@@ -80,7 +80,7 @@ def positions(
     from standoff.evaluation.positions import NOTE, evaluate_positions
 
     result = evaluate_positions(
-        run_folder, truth, frames=_frame_range(frames), pairs_up_to_m=pairs_up_to, min_overlap=min_overlap
+        run_folder, truth, frames=frame_range(frames), pairs_up_to_m=pairs_up_to, min_overlap=min_overlap
     )
     if json_file is not None:
         write_json(result.to_dict(), json_file)
@@ -121,13 +121,3 @@ def rectification(
 
 def _figure(value: float | None) -> str:
     return "" if value is None else f"{value:.4g}"
-
-
-def _frame_range(text: str | None) -> tuple[int, int] | None:
-    if text is None:
-        return None
-    expected, example = "--frames FIRST-LAST", "--frames 1-219"
-    first, last = two_integers(text, "-", expected=expected, example=example)
-    if not 0 < first <= last:
-        raise ConfigError(expected=expected, found=repr(text), fix=f"write for example {example}")
-    return first, last

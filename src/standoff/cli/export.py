@@ -16,11 +16,12 @@ def export(
     names: Annotated[Path, typer.Option(help="Class names, one a line.", show_default=False)],
     out: Annotated[Path, typer.Option(help="ONNX file to write.", show_default=False)],
     size: Annotated[str | None, typer.Option(help="Input size, WxH. Absent: the cfg's.")] = None,
+    half: Annotated[bool, typer.Option("--half", help="Store the weights in half precision: half the file.")] = False,
 ) -> None:
     """Turn a Darknet network (YOLOv3 and its family) into one self-describing ONNX file."""
     from standoff.training import export_darknet
 
-    export_darknet(cfg, weights, names, _size(size), out)
+    export_darknet(cfg, weights, names, _size(size), out, half=half)
     typer.echo(f"wrote {out} ({out.stat().st_size / 1e6:.1f} MB)")
 
 

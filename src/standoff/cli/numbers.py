@@ -1,4 +1,4 @@
-"""Two whole numbers with a sign between them, as several options take them."""
+"""Two whole numbers with a sign between them, as several options take them, and ranges of frames."""
 
 from __future__ import annotations
 
@@ -24,3 +24,21 @@ def two_integers(text: str, sign: str, *, expected: str, example: str) -> tuple[
     if not (found and first.isdecimal() and second.isdecimal()):
         raise ConfigError(expected=expected, found=repr(text), fix=f"write for example {example}")
     return int(first), int(second)
+
+
+def frame_range(text: str | None) -> tuple[int, int] | None:
+    """Read `FIRST-LAST`, frames counted from 1; None stays None.
+
+    Raises:
+        ConfigError: It is not of that form.
+
+    >>> frame_range("1-219")
+    (1, 219)
+    """
+    if text is None:
+        return None
+    expected, example = "--frames FIRST-LAST", "--frames 1-219"
+    first, last = two_integers(text, "-", expected=expected, example=example)
+    if not 0 < first <= last:
+        raise ConfigError(expected=expected, found=repr(text), fix=f"write for example {example}")
+    return first, last

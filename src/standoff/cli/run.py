@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import signal
+from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 from time import monotonic
@@ -14,6 +15,7 @@ import typer
 from standoff.core.errors import ConfigError, StandoffError
 
 if TYPE_CHECKING:
+    from standoff.core.types import FrameResult
     from standoff.monitor import Run
 
 
@@ -62,7 +64,9 @@ def run(
     source: Annotated[Path, typer.Argument(help="Video file, or a folder of pictures.", show_default=False)],
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the outputs.", show_default=False)],
     config: Annotated[Path | None, typer.Option(help="Settings, YAML (see `standoff config show`).")] = None,
-    model: Annotated[Path | None, typer.Option(help="Detector, ONNX (see `standoff export`).")] = None,
+    model: Annotated[
+        str | None, typer.Option(help="Detector: site (ours, the default), site-int8 (quicker), or an ONNX file.")
+    ] = None,
     ground: Annotated[
         str | None,
         typer.Option(help="survey.yaml (surveyed points), square:SIDE (a square reference, side in m), or none."),
@@ -105,13 +109,13 @@ def run(
     for warning in ground_warnings(opened.pipeline.ground):
         typer.echo(f"standoff: warning: {warning}", err=True)
     try:
-        _watch(opened, quiet=quiet)
+        watch(opened, quiet=quiet)
     except StandoffError:
         # Its own line says it all; only a machine still wants the record.
-        _tell(out / RECORD, as_json=as_json, quiet=True)
+        tell(out / RECORD, as_json=as_json, quiet=True)
         raise
-    _tell(out / RECORD, as_json=as_json, quiet=quiet)
-    raise typer.Exit(_status(out / RECORD))
+    tell(out / RECORD, as_json=as_json, quiet=quiet)
+    raise typer.Exit(exit_status(out / RECORD))
 
 
 class _StopRequest:
@@ -130,7 +134,14 @@ class _StopRequest:
         signal.signal(number, signal.SIG_DFL)
 
 
-def _watch(opened: Run, *, quiet: bool) -> None:
+def watch(opened: Run, *, quiet: bool, on_result: Callable[[FrameResult], None] | None = None) -> None:
+    """Go through a run with a progress bar; Ctrl-C ends it after the frame in hand.
+
+    Args:
+        opened: The run.
+        quiet: No progress bar.
+        on_result: Called with each frame's result.
+    """
     from standoff.cli.console import progress_bar
 
     stop = _StopRequest()
@@ -138,13 +149,15 @@ def _watch(opened: Run, *, quiet: bool) -> None:
     with closing(results), progress_bar(quiet=quiet) as bar:
         task = bar.add_task("monitoring", total=opened.source.frame_count, rate=0.0)
         started = monotonic()
-        for count, _ in enumerate(results, start=1):
+        for count, result in enumerate(results, start=1):
+            if on_result is not None:
+                on_result(result)
             bar.update(task, completed=count, rate=count / (monotonic() - started))
             if stop.received:
                 break
 
 
-def _tell(record_file: Path, *, as_json: bool, quiet: bool) -> None:
+def tell(record_file: Path, *, as_json: bool, quiet: bool) -> None:
     """Print the record, or a summary of it."""
     from standoff.cli.console import print_table, write_json
 
@@ -166,7 +179,7 @@ def _tell(record_file: Path, *, as_json: bool, quiet: bool) -> None:
         print_table(f"{record['status']}: {record_file.parent}", ("", ""), rows, record["message"], texts=2)
 
 
-def _status(record_file: Path) -> int:
+def exit_status(record_file: Path) -> int:
     """Return 1 for a run that was interrupted, did not measure anything, or lost an output."""
     record = json.loads(record_file.read_text(encoding="utf-8"))
     if record["status"] == "interrupted":

@@ -10,6 +10,7 @@ import typer
 from typer.core import TyperGroup
 
 from standoff.cli.numbers import two_integers
+from standoff.cli.simulate_composites import composites
 from standoff.simulation import require_packages
 from standoff.simulation.presets import MAX_SEED, PRESETS
 
@@ -96,6 +97,7 @@ def _clip_command(name: str) -> Callable[..., None]:
 
 for _name in PRESETS:
     app.command(_name)(_clip_command(_name))
+app.command()(composites)
 
 
 @app.command()

@@ -5,7 +5,8 @@ which checks their bounds.
 """
 
 from standoff.config.build import build_ground, build_pipeline, build_replacement, build_stage, import_factory
-from standoff.config.load import load_settings, resolved
+from standoff.config.load import load_settings, read_settings_file, resolved
+from standoff.config.params import read_params
 from standoff.config.settings import (
     OUTPUT_NAMES,
     STAGE_NAMES,
@@ -28,5 +29,7 @@ __all__ = [
     "build_stage",
     "import_factory",
     "load_settings",
+    "read_params",
+    "read_settings_file",
     "resolved",
 ]

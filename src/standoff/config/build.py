@@ -12,7 +12,7 @@ from standoff.core.errors import ConfigError
 from standoff.core.protocols import Detector, Ground
 from standoff.core.types import Frame
 from standoff.pipeline import Pipeline
-from standoff.stages.detect import OnnxDetector
+from standoff.stages.detect import OnnxDetector, find_model
 from standoff.stages.ground import ReferenceGround, Unmapped, load_camera, load_survey
 from standoff.stages.hazard import HazardMonitor
 from standoff.stages.locate import Locator
@@ -59,16 +59,9 @@ def build_detector(settings: Settings) -> Detector:
     """Load the configured model.
 
     Raises:
-        ConfigError: No model is configured.
         ModelError: It cannot be used.
     """
-    if settings.model is None:
-        raise ConfigError(
-            expected="a detector",
-            found="none (no --model, no `model:` in the settings)",
-            fix="pass --model model.onnx; `standoff export` makes one from Darknet weights",
-        )
-    return OnnxDetector(settings.model, settings.detect)
+    return OnnxDetector(find_model(settings.model), settings.detect)
 
 
 def build_ground(settings: Settings) -> Ground:

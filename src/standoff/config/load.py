@@ -14,6 +14,7 @@ from pydantic_settings import BaseSettings, InitSettingsSource, PydanticBaseSett
 
 from standoff.config.settings import Settings
 from standoff.core.errors import ConfigError
+from standoff.stages.detect import SHIPPED_MODELS
 
 
 def _clause(error: ErrorDetails) -> str:
@@ -24,7 +25,8 @@ def _clause(error: ErrorDetails) -> str:
     return f"{where}: {message}{found}" if where else message
 
 
-def _config_error(origin: str, error: ValidationError) -> ConfigError:
+def config_error(origin: str, error: ValidationError) -> ConfigError:
+    """Return what is wrong with settings, in one line; at most three mistakes in full."""
     clauses = [_clause(one) for one in error.errors()]
     more = f"; and {len(clauses) - 3} more" if len(clauses) > 3 else ""
     return ConfigError(
@@ -34,7 +36,12 @@ def _config_error(origin: str, error: ValidationError) -> ConfigError:
     )
 
 
-def _read_yaml(path: Path) -> dict[str, Any]:
+def read_settings_file(path: Path) -> dict[str, Any]:
+    """Read a YAML file of settings by name.
+
+    Raises:
+        ConfigError: It cannot be read, or holds something else.
+    """
     try:
         loaded = yaml.safe_load(path.read_text(encoding="utf-8"))
     except OSError as error:
@@ -56,7 +63,8 @@ def _anchor_paths(settings: dict[str, Any], folder: Path) -> None:
     """Make paths absolute: those of a file are relative to it, not to wherever the program was started."""
     ground = settings.get("ground")
     for section, name in ((settings, "model"), (ground, "survey"), (ground, "camera")):
-        if isinstance(section, dict) and isinstance(section.get(name), str):
+        named = name == "model" and settings.get(name) in SHIPPED_MODELS
+        if isinstance(section, dict) and isinstance(section.get(name), str) and not named:
             section[name] = str((folder / section[name]).resolve())
 
 
@@ -73,7 +81,7 @@ def load_settings(path: Path | str | None = None, overrides: Mapping[str, Any] |
     from_file: dict[str, Any] = {}
     if path is not None:
         path = Path(path)
-        from_file = _read_yaml(path)
+        from_file = read_settings_file(path)
         _anchor_paths(from_file, path.parent)
 
     from_caller = copy.deepcopy(dict(overrides or {}))
@@ -94,7 +102,7 @@ def load_settings(path: Path | str | None = None, overrides: Mapping[str, Any] |
     try:
         return _FileSettings(**from_caller)
     except ValidationError as error:
-        raise _config_error(str(path) if path else "the command line and environment", error) from error
+        raise config_error(str(path) if path else "the command line and environment", error) from error
 
 
 def resolved(settings: Settings) -> dict[str, Any]:

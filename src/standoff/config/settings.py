@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, get_type_hints
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
-from standoff.stages.detect import DetectParams
+from standoff.stages.detect import DetectParams, ShippedModel
 from standoff.stages.ground import ReferenceParams, ReferenceShape
 from standoff.stages.hazard import HazardParams
 from standoff.stages.locate import LocateParams
@@ -123,7 +123,13 @@ class Settings(BaseSettings):
         nested_model_default_partial_update=True,
     )
 
-    model: Annotated[Path | None, Field(description="The detector, an ONNX file (see `standoff export`).")] = None
+    model: Annotated[
+        ShippedModel | Path,
+        Field(
+            description="The detector: site (comes with standoff), site-int8 (the same, quicker), or an ONNX file (see "
+            "`standoff export`)."
+        ),
+    ] = "site"
     start_s: Annotated[float, Field(ge=0, description="Begin here; s.")] = 0.0
     stop_s: Annotated[float | None, Field(gt=0, description="End here; s. Absent: the source's end.")] = None
     every: Annotated[int, Field(ge=1, description="Read every k-th frame only.")] = 1

@@ -19,7 +19,7 @@ from standoff.evaluation.bench_baselines import (
 from standoff.evaluation.bench_workload import DrawingSink, monitor_workload
 from standoff.evaluation.timing import Baseline, StageTimes, collect_times, machine
 from standoff.monitor import open_run
-from standoff.stages.detect import OnnxDetector
+from standoff.stages.detect import OnnxDetector, find_model
 from standoff.stages.frames import open_source
 
 OWN_WORK_LIMIT_MS = 10.0
@@ -118,9 +118,9 @@ def _picture_baselines(source: Path, settings: Settings, frames: int) -> Iterato
 
 
 def _detection_baselines(source: Path, settings: Settings, darknet: tuple[Path, Path] | None) -> Iterator[Baseline]:
-    if darknet is None or settings.model is None:
+    if darknet is None:
         return
-    detector = OnnxDetector(settings.model, settings.detect)
+    detector = OnnxDetector(find_model(settings.model), settings.detect)
     width_px, height_px = detector.description["input_size_px"]
     with open_source(source, fps=settings.fps, start_s=settings.start_s) as opened:
         frames = list(islice(opened, _DETECTION_FRAMES))

@@ -33,6 +33,8 @@ _PROPS_AWAY_M = 0.8
 _TOOL_RADIUS_M = 1.2
 _TRIES = 12
 _BUSY_WORKERS, _BUSY_MACHINES = 8, 5
+_BREACH_M, _NEAR_MISS_M = 5.6, 8.4
+"""Distances of worker and wheel loader, whose circles touch at 7.8 m."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,6 +137,28 @@ def _mobile(rng: np.random.Generator, stage: Stage) -> Cast:
     points = [stage.place(x, y) for x, y in ((6.0, -5.0), (2.0, -0.5), (-3.0, 1.8), (-9.0, 1.5), (-13.0, -2.0))]
     walks = behaviour.walking_past(rng, worker, [(p.x_m, p.y_m) for p in points], stage.duration_s)
     cast.add([worker], [walks], force=True)
+    return cast
+
+
+def _demo(rng: np.random.Generator, stage: Stage) -> Cast:
+    """One near miss and one breach: a reversing loader passes one worker, and another crosses behind it.
+
+    The excavator and the worker at the footing keep away from everybody.
+    """
+    cast = Cast()
+    excavator, loader = stage.excavator(rng), make_wheel_loader(rng)
+    beside, behind, apart = make_worker(rng), make_worker(rng), make_worker(rng)
+    digs = behaviour.digging(rng, excavator, stage.place(13.0, 8.0, 70.0), stage.duration_s)
+    cast.add([excavator], [digs], force=True)
+    start = stage.place(-10.0, 14.0, 97.0)
+    crossing = behaviour.crossing_behind(
+        rng, loader, behind, start, stage.duration_s, closest_m=_BREACH_M, to_left=True
+    )
+    cast.add([loader, behind], crossing, force=True)
+    works = behaviour.standing_working(rng, beside, start.moved(-4.0, _NEAR_MISS_M), stage.duration_s)
+    cast.add([beside], [works], force=True)
+    measures = behaviour.standing_working(rng, apart, stage.place(3.0, -6.5), stage.duration_s)
+    cast.add([apart], [measures], force=True)
     return cast
 
 
@@ -304,6 +328,7 @@ def _any_number(rng: np.random.Generator, stage: Stage) -> Cast:
 CASTS: Mapping[str, Callable[[np.random.Generator, Stage], Cast]] = MappingProxyType(
     {
         "mobile": _mobile,
+        "demo": _demo,
         "stationary-15": partial(_stationary, distance_m=15.0),
         "stationary-20": partial(_stationary, distance_m=20.0),
         "board": _nobody,

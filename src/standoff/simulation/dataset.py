@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Generator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
@@ -12,14 +11,12 @@ from typing import Literal, get_args
 
 import cv2
 import numpy as np
-import yaml
 
-from standoff.core.classes import CLASSES
-from standoff.simulation.coco import Annotations
 from standoff.simulation.covers import COVER_KINDS
 from standoff.simulation.crew import work_through
 from standoff.simulation.moment import scene_at
 from standoff.simulation.output import whole_folder
+from standoff.simulation.picture_set import Picture, PictureSet, is_marked
 from standoff.simulation.presets import MAX_SEED, Condition, CoverPlan, Plan, Preset, check_seed, check_size
 from standoff.simulation.render import Look
 from standoff.simulation.scene import Scene
@@ -29,15 +26,10 @@ from standoff.simulation.studio import Studio
 from standoff.simulation.truth import Row
 from standoff.simulation.viewpoints import Obstacles, draw_flight, draw_view
 
-SPLITS = ("train", "val", "test")
 _SCENE_FRAMES = 240
 _SHUTTERS_S = (0.0, 0.0, 1 / 240, 1 / 100)
 """Least exposure times: how much a passing drone smears its pictures."""
 _CONDITION_SHARES = (0.22, 0.26, 0.12, 0.12, 0.22, 0.06)
-_MIN_VISIBLE_PX, _MIN_SIDE_PX = 16, 6
-_MIN_VISIBLE_SHARE = 0.15
-_PLAIN_PX = 1500
-"""Of a machine is plain to see, however small a share of it that is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,25 +79,6 @@ class DatasetPlan:
         return "val" if place < held_out else "test" if place < 2 * held_out else "train"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Picture:
-    """One picture of a dataset.
-
-    Attributes:
-        name: Of the file, without folder.
-        jpeg: Its content.
-        size_px: (width, height).
-        entities: Rows of `truth.TRUTH_SCHEMA` that somebody would mark.
-        scene: Index of its scene.
-    """
-
-    name: str
-    jpeg: bytes
-    size_px: tuple[int, int]
-    entities: list[Row]
-    scene: int
-
-
 def record_dataset(
     plan: DatasetPlan,
     out: Path,
@@ -128,57 +101,17 @@ def record_dataset(
         MissingDependency: No OpenGL.
     """
     with whole_folder(out, overwrite=overwrite) as folder:
-        annotations = {split: Annotations() for split in SPLITS}
-        for split in SPLITS:
-            (folder / "images" / split).mkdir(parents=True)
-            if plan.layout == "yolo":
-                (folder / "labels" / split).mkdir(parents=True)
+        pictures = PictureSet(folder, plan.layout)
         jobs = range(plan.scenes)
         scenes = work_through(partial(open_scene_shooter, plan), jobs, processes=min(processes, len(jobs)))
         with closing(scenes):
-            for scene, pictures in enumerate(scenes):
-                split = plan.split_of(scene)
-                for picture in pictures:
-                    (folder / "images" / split / picture.name).write_bytes(picture.jpeg)
-                    if plan.layout == "yolo":
-                        label = folder / "labels" / split / Path(picture.name).with_suffix(".txt")
-                        label.write_text("".join(yolo_line(row, picture.size_px) for row in picture.entities))
-                    else:
-                        entry = {"file_name": f"images/{split}/{picture.name}", "scene": scene}
-                        annotations[split].add(entry, picture.entities, picture.size_px, None)
+            for scene, shot in enumerate(scenes):
+                for picture in shot:
+                    pictures.add(plan.split_of(scene), picture)
                     if on_picture is not None:
                         on_picture()
-        _describe(plan, folder, annotations)
-
-
-def _describe(plan: DatasetPlan, folder: Path, annotations: dict[str, Annotations]) -> None:
-    if plan.layout == "coco":
-        (folder / "annotations").mkdir()
-        for split in SPLITS:
-            text = json.dumps(annotations[split].to_dict(f"standoff simulated sites, seed {plan.seed}, {split}"))
-            (folder / "annotations" / f"{split}.json").write_text(text)
-    names = {site_class.id: site_class.name for site_class in CLASSES}
-    content = {**{split: f"images/{split}" for split in SPLITS}, "names": names}
-    (folder / "data.yaml").write_text(yaml.safe_dump(content, sort_keys=False))
-    settings = {"images": plan.images, "per_scene": plan.per_scene, "seed": plan.seed, "scenes": plan.scenes}
-    (folder / "dataset.json").write_text(json.dumps(settings))
-
-
-def yolo_line(row: Row, size_px: tuple[int, int]) -> str:
-    r"""Return one line of a YOLO label file: class, centre and size as shares of the picture.
-
-    >>> yolo_line({"class_id": 2, "x1_px": -0.5, "y1_px": -0.5, "x2_px": 9.5, "y2_px": 4.5}, (20, 10))
-    '2 0.250000 0.250000 0.500000 0.500000\n'
-    """
-    left, top, right, bottom = (row[f"{name}_px"] + 0.5 for name in ("x1", "y1", "x2", "y2"))
-    width_px, height_px = size_px
-    shares = (
-        (left + right) / 2 / width_px,
-        (top + bottom) / 2 / height_px,
-        (right - left) / width_px,
-        (bottom - top) / height_px,
-    )
-    return f"{row['class_id']} " + " ".join(f"{share:.6f}" for share in shares) + "\n"
+        settings = {"images": plan.images, "per_scene": plan.per_scene, "seed": plan.seed, "scenes": plan.scenes}
+        pictures.finish(f"standoff simulated sites, seed {plan.seed}", settings)
 
 
 @contextmanager
@@ -198,7 +131,7 @@ def open_scene_shooter(plan: DatasetPlan) -> Generator[Callable[[int], list[Pict
         for index in range(min(plan.per_scene, plan.images - scene * plan.per_scene)):
             jpeg, entities = _shoot(studio, site, obstacles, rng, index)
             name = f"{plan.seed}-{scene:05d}-{index:02d}.jpg"
-            pictures.append(Picture(name, jpeg, (plan.width_px, plan.height_px), entities, scene))
+            pictures.append(Picture(name, jpeg, (plan.width_px, plan.height_px), entities, about={"scene": scene}))
         return pictures
 
     try:
@@ -269,11 +202,3 @@ def _vary(rng: np.random.Generator, look: Look) -> Look:
         saturation=look.saturation * float(rng.uniform(0.85, 1.25)),
         white_balance=(red * float(1.0 + warmth), green * float(rng.normal(1.0, 0.008)), blue * float(1.0 - warmth)),
     )
-
-
-def is_marked(row: Row) -> bool:
-    """Return whether somebody who marks pictures would mark an entity; the rest is too small or too hidden."""
-    side_px = max(row["x2_px"] - row["x1_px"], row["y2_px"] - row["y1_px"])
-    if row["visible_px"] < _MIN_VISIBLE_PX or side_px < _MIN_SIDE_PX:
-        return False
-    return bool(row["visible_share"] >= _MIN_VISIBLE_SHARE or row["visible_px"] >= _PLAIN_PX)

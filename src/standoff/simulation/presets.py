@@ -59,6 +59,7 @@ class Preset:
         clutter: Density of props, 1 is a busy site.
         furnished_m: Props stand within this distance of the middle; None: where the camera looks.
         reference_offset_m: Right of and beyond the middle of the picture, of the reference object's centre.
+        bit_rate_mbps: Of the film; None is a drone's own.
     """
 
     summary: str
@@ -79,6 +80,7 @@ class Preset:
     clutter: float = 1.0
     furnished_m: float | None = None
     reference_offset_m: tuple[float, float] = (-3.0, -2.0)
+    bit_rate_mbps: float | None = None
 
 
 PRESETS: Mapping[str, Preset] = MappingProxyType(
@@ -128,6 +130,11 @@ PRESETS: Mapping[str, Preset] = MappingProxyType(
         "night-ish": Preset(
             "Dusk: low light, high gain, noise.",
             "mobile", condition="dusk", style="yard",
+        ),
+        "demo": Preset(
+            "The clip that standoff ships: one near miss and one breach at a wheel loader, an excavator apart.",
+            "demo", frames=250, fps=25.0, altitude_m=23.0, soil="brown earth", clutter=0.6, bit_rate_mbps=5.6,
+            reference_offset_m=(-1.0, -3.5),
         ),
     }
 )  # fmt: skip

@@ -73,7 +73,8 @@ def record_clip(
         shots = work_through(
             partial(open_shooter, plan), list(enumerate(times_s.tolist())), processes=min(processes, len(times_s))
         )
-        with closing(shots), VideoWriter(folder / "video.mp4", size_px) as video:
+        rate_bps = None if plan.preset.bit_rate_mbps is None else int(plan.preset.bit_rate_mbps * 1e6)
+        with closing(shots), VideoWriter(folder / "video.mp4", size_px, bit_rate_bps=rate_bps) as video:
             for shot in shots:
                 video.write(shot.image, shot.frame["time_s"])
                 tables.add(shot)

@@ -14,7 +14,7 @@ from typing import Final, Literal, TypeAlias, cast, get_args
 
 from standoff.core.errors import ModelError
 
-Activation = Literal["linear", "leaky", "logistic"]
+Activation = Literal["linear", "leaky", "logistic", "relu", "relu6"]
 
 
 @dataclass(frozen=True, slots=True)

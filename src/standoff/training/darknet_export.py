@@ -5,21 +5,23 @@ See `standoff.stages.detect.model_card` for the file's input, output and metadat
 
 from __future__ import annotations
 
-import importlib.util
 import warnings
 from dataclasses import replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
-from standoff.core.errors import MissingDependency, ModelError, OutputError
+from standoff.core.errors import ModelError
 from standoff.stages.detect.model_card import INPUT_NAME, OUTPUT_NAME, ModelCard, file_sha256
 from standoff.training.darknet_cfg import DarknetCfg, read_cfg, read_text
 from standoff.training.darknet_shapes import largest_stride
+from standoff.training.required import require_packages
+from standoff.training.whole_file import whole_file
 
 _OPSET = 17
 
 
-def export_darknet(cfg: Path, weights: Path, names: Path, size_px: tuple[int, int] | None, out: Path) -> ModelCard:
+def export_darknet(
+    cfg: Path, weights: Path, names: Path, size_px: tuple[int, int] | None, out: Path, *, half: bool = False
+) -> ModelCard:
     """Export a Darknet detector to ONNX.
 
     Args:
@@ -28,6 +30,7 @@ def export_darknet(cfg: Path, weights: Path, names: Path, size_px: tuple[int, in
         names: One class name a line, in the cfg's order.
         size_px: (width, height) of the network's input; None: the cfg's own.
         out: The ONNX file; appears only when complete, and replaces an older one.
+        half: Store the weights in half precision (see `standoff.training.half_precision`).
 
     Returns:
         What the file says about itself.
@@ -37,7 +40,7 @@ def export_darknet(cfg: Path, weights: Path, names: Path, size_px: tuple[int, in
         MissingDependency: torch or onnx is not installed.
         OutputError: The file cannot be written.
     """
-    _require("torch", "onnx")
+    require_packages("torch", "onnx", purpose="export a model")
     network = read_cfg(cfg)
     if size_px is not None:
         network = replace(network, width_px=size_px[0], height_px=size_px[1])
@@ -48,28 +51,13 @@ def export_darknet(cfg: Path, weights: Path, names: Path, size_px: tuple[int, in
         input_size_px=(network.width_px, network.height_px),
         sources={path.name: file_sha256(path) for path in (cfg, weights, names) if path.is_file()},
     )
-    try:
-        with TemporaryDirectory(dir=out.parent, prefix=".export-") as folder:
-            half_written = Path(folder) / out.name
-            _write_onnx(network, weights, card, half_written)
-            half_written.replace(out)
-    except OSError as error:
-        raise OutputError(
-            expected=f"a place to write {out}",
-            found=error.strerror or type(error).__name__,
-            fix="choose a file in an existing folder that you may write to",
-        ) from error
+    with whole_file(out) as path:
+        _write_onnx(network, weights, card, path)
+        if half:
+            from standoff.training.half_precision import store_half
+
+            store_half(path, path)
     return card
-
-
-def _require(*packages: str) -> None:
-    missing = [package for package in packages if importlib.util.find_spec(package) is None]
-    if missing:
-        raise MissingDependency(
-            expected="torch and onnx to export a model",
-            found=f"no {' and no '.join(missing)}",
-            fix="run pip install 'standoff[train]'",
-        )
 
 
 def _check_input(network: DarknetCfg) -> None:

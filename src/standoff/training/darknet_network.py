@@ -27,9 +27,17 @@ _BATCH_NORM_EPSILON = 1e-6
 
 
 def _activation(name: Activation) -> nn.Module:
-    if name == "leaky":
-        return nn.LeakyReLU(_LEAKY_SLOPE)
-    return nn.Sigmoid() if name == "logistic" else nn.Identity()
+    match name:
+        case "linear":
+            return nn.Identity()
+        case "leaky":
+            return nn.LeakyReLU(_LEAKY_SLOPE)
+        case "logistic":
+            return nn.Sigmoid()
+        case "relu":
+            return nn.ReLU()
+        case "relu6":
+            return nn.ReLU6()
 
 
 class ConvolutionBlock(nn.Module):
@@ -181,7 +189,10 @@ class DecodedNetwork(nn.Module):
             edge of the first pixel), objectness, and the probability of each class given an object.
             Rows run over heads, then cell rows, cell columns and anchors.
         """
-        heads = self.network(pictures)
+        return self.decode(self.network(pictures))
+
+    def decode(self, heads: tuple[Tensor, ...]) -> Tensor:
+        """Turn raw heads into what `forward` returns."""
         return torch.cat([decode(head) for decode, head in zip(self.decoders, heads, strict=True)], dim=1)
 
 

@@ -103,9 +103,31 @@ def _step(layer: Layer, before: Fraction, strides: list[Fraction]) -> Fraction:
             return before
 
 
-def largest_stride(cfg: DarknetCfg) -> int:
-    """Return the input pixels per cell of the coarsest layer; input sides must be multiples of it."""
+def layer_strides(cfg: DarknetCfg) -> tuple[Fraction, ...]:
+    """Return the input pixels per cell of every layer's output."""
     strides: list[Fraction] = []
     for layer in cfg.layers:
         strides.append(_step(layer, strides[-1] if strides else Fraction(1), strides))
-    return int(max(strides))
+    return tuple(strides)
+
+
+def largest_stride(cfg: DarknetCfg) -> int:
+    """Return the input pixels per cell of the coarsest layer; input sides must be multiples of it."""
+    return int(max(layer_strides(cfg)))
+
+
+def weights_numbers(cfg: DarknetCfg) -> int:
+    r"""Return how many numbers a weights file of all layers holds.
+
+    >>> from standoff.training.darknet_cfg import parse_cfg
+    >>> weights_numbers(parse_cfg("[net]\n[convolutional]\nfilters=7\n[yolo]\nanchors=1,1\nclasses=2"))
+    28
+    """
+    shapes = layer_shapes(cfg)
+    before = (cfg.channels, *(shape.channels for shape in shapes))
+    total = 0
+    for layer, channels in zip(cfg.layers, before, strict=False):
+        if isinstance(layer, Convolutional):
+            kernels = layer.filters * layer.size**2 * channels // layer.groups
+            total += kernels + layer.filters * (4 if layer.batch_normalized else 1)
+    return total

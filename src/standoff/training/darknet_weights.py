@@ -10,13 +10,16 @@ from __future__ import annotations
 import struct
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 import torch
 from torch import Tensor
 
-from standoff.core.errors import ModelError
+from standoff.core.errors import ModelError, OutputError
 from standoff.training.darknet_network import ConvolutionBlock, DarknetNetwork
+
+Numbers: TypeAlias = np.ndarray[tuple[int], np.dtype[np.float32]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +61,7 @@ def _parameters(block: ConvolutionBlock) -> list[Tensor]:
     return [normalization.bias, normalization.weight, mean, variance, block.convolution.weight]
 
 
-def _split(content: bytes, path: Path) -> tuple[WeightsHeader, np.ndarray[tuple[int], np.dtype[np.float32]]]:
+def _split(content: bytes, path: Path) -> tuple[WeightsHeader, Numbers]:
     try:
         major, minor, revision = struct.unpack_from("<iii", content)
         header = WeightsHeader(major, minor, revision)
@@ -80,6 +83,21 @@ def _split(content: bytes, path: Path) -> tuple[WeightsHeader, np.ndarray[tuple[
     return replace(header, seen=seen), np.frombuffer(content, "<f4", count, start)
 
 
+def read_numbers(path: Path) -> tuple[WeightsHeader, Numbers]:
+    """Read a weights file without knowing what network it belongs to.
+
+    Raises:
+        ModelError: It cannot be read, or is cut within its header or a number.
+    """
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise ModelError(
+            expected=f"a Darknet weights file at {path}", found=error.strerror or "no file", fix="check the path"
+        ) from error
+    return _split(content, path)
+
+
 def load_weights(network: DarknetNetwork, path: Path) -> WeightsHeader:
     """Read a weights file into a network.
 
@@ -89,44 +107,70 @@ def load_weights(network: DarknetNetwork, path: Path) -> WeightsHeader:
 
     Raises:
         ModelError: It cannot be read, is too short (says at which layer), too long, or holds numbers
-            that are not finite.
+            that cannot be weights.
     """
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise ModelError(
-            expected=f"a Darknet weights file at {path}", found=error.strerror or "no file", fix="check the path"
-        ) from error
-    header, numbers = _split(content, path)
+    header, numbers = read_numbers(path)
+    fill_convolutions(network, numbers, path.name)
+    return header
+
+
+def fill_convolutions(network: DarknetNetwork, numbers: Numbers, file_name: str, *, may_end_early: bool = False) -> int:
+    """Fill convolutions one after another with the numbers of a weights file.
+
+    Args:
+        network: Changed in place.
+        numbers: The file's content after its header.
+        file_name: For messages.
+        may_end_early: True if the numbers may end between two layers; the network's remaining layers stay as they are.
+
+    Returns:
+        Number of convolutions filled.
+
+    Raises:
+        ModelError: The numbers do not fit; says at which layer.
+    """
     position = 0
-    for index, block in network.convolutions():
+    for filled, (index, block) in enumerate(network.convolutions()):
         parameters = _parameters(block)
         needed = sum(parameter.numel() for parameter in parameters)
         own = numbers[position : position + needed]
+        if len(own) == 0 and may_end_early and filled:
+            return filled
         if len(own) < needed:
             raise ModelError(
-                expected=f"{needed} numbers in {path} for {network.cfg.section(index)}",
+                expected=f"{needed} numbers in {file_name} for {network.cfg.section(index)}",
                 found=f"{len(own)} left",
                 fix="give the weights that belong to this cfg",
             )
-        if not np.isfinite(own).all():
-            raise ModelError(
-                expected=f"finite numbers in {path} for {network.cfg.section(index)}",
-                found="NaN or infinity",
-                fix="give the weights that belong to this cfg, from a training that did not diverge",
-            )
+        _refuse_impossible(own, block, f"{file_name} for {network.cfg.section(index)}")
         _fill(parameters, own)
         position += needed
     if position < len(numbers):
         raise ModelError(
-            expected=f"{position} numbers in {path} for all layers of {network.cfg.name}",
+            expected=f"{position} numbers in {file_name} for all layers of {network.cfg.name}",
             found=f"{len(numbers)}, {len(numbers) - position} too many",
             fix="give the weights that belong to this cfg",
         )
-    return header
+    return len(network.convolutions())
 
 
-def _fill(parameters: list[Tensor], numbers: np.ndarray[tuple[int], np.dtype[np.float32]]) -> None:
+def _refuse_impossible(numbers: Numbers, block: ConvolutionBlock, where: str) -> None:
+    if not np.isfinite(numbers).all():
+        raise ModelError(
+            expected=f"finite numbers in {where}",
+            found="NaN or infinity",
+            fix="give the weights that belong to this cfg, from a training that did not diverge",
+        )
+    filters = block.convolution.out_channels
+    if block.normalization is not None and (lowest := numbers[3 * filters : 4 * filters].min()) < 0:
+        raise ModelError(
+            expected=f"variances that are not negative in {where}",
+            found=f"{lowest:g}",
+            fix="give the weights that belong to this cfg, these are of another architecture",
+        )
+
+
+def _fill(parameters: list[Tensor], numbers: Numbers) -> None:
     position = 0
     with torch.no_grad():
         for parameter in parameters:
@@ -135,18 +179,36 @@ def _fill(parameters: list[Tensor], numbers: np.ndarray[tuple[int], np.dtype[np.
             position += parameter.numel()
 
 
-def save_weights(network: DarknetNetwork, path: Path, header: WeightsHeader | None = None) -> None:
+def save_weights(
+    network: DarknetNetwork, path: Path, header: WeightsHeader | None = None, cut_after_layer: int | None = None
+) -> None:
     """Write a network's parameters as a weights file that Darknet reads.
 
     Args:
         network: The network.
-        path: Written, or overwritten.
+        path: Appears only when complete, and replaces an older one.
         header: By default version 0.2.5, no picture seen.
+        cut_after_layer: Number of the last layer whose parameters are written (74 gives a `darknet53.conv.74`);
+            None: all of them.
+
+    Raises:
+        OutputError: The file cannot be written.
     """
     header = header or WeightsHeader()
-    with path.open("wb") as file:
-        file.write(struct.pack("<iii", header.major, header.minor, header.revision))
-        file.write(struct.pack(header.seen_format, header.seen))
-        for _, block in network.convolutions():
-            for parameter in _parameters(block):
-                file.write(parameter.detach().cpu().numpy().astype("<f4").tobytes())
+    half_written = path.with_name(f".{path.name}.part")
+    try:
+        with half_written.open("wb") as file:
+            file.write(struct.pack("<iii", header.major, header.minor, header.revision))
+            file.write(struct.pack(header.seen_format, header.seen))
+            for index, block in network.convolutions():
+                if cut_after_layer is None or index <= cut_after_layer:
+                    for parameter in _parameters(block):
+                        file.write(parameter.detach().cpu().numpy().astype("<f4").tobytes())
+        half_written.replace(path)
+    except OSError as error:
+        half_written.unlink(missing_ok=True)
+        raise OutputError(
+            expected=f"a place to write {path}",
+            found=error.strerror or type(error).__name__,
+            fix="choose a file in an existing folder that you may write to",
+        ) from error

@@ -235,3 +235,12 @@ def test_people_in_a_real_picture_are_found_once_with_and_without_slices(shared_
         for foot_px in ((661.0, 319.0), (268.0, 304.0), (515.0, 228.0)):  # read off the picture
             near = np.abs((workers[:, [0, 3]] + workers[:, [2, 3]]) / 2 - foot_px).max(axis=1) < 12
             assert near.sum() == 1
+
+
+def test_a_small_thing_seen_roughly_in_the_frame_and_well_in_a_slice_is_one_thing(make_model: MakeModel) -> None:
+    model, frame = make_model(LABELS, (64, 64)), _frame((512, 512), (20, 20, 20, YELLOW))
+    roughly = OnnxDetector(model).detect(frame)
+    np.testing.assert_allclose(roughly.xyxy_px, [[-0.5, -0.5, 63.5, 63.5]], atol=1e-4)
+    # A cell of a slice is 42.75 px: it overlaps the frame's cell of 64 px by 0.446, which is no duplicate.
+    sliced = OnnxDetector(model, DetectParams(slices=(2, 2), slice_overlap=0.5)).detect(frame)
+    np.testing.assert_allclose(sliced.xyxy_px, [[-0.5, -0.5, 42.25, 42.25]], atol=1e-4)

@@ -7,7 +7,8 @@ import tolerances
 from hypothesis import given
 from hypothesis import strategies as st
 
-from standoff.stages.detect.letterbox import Letterbox
+from standoff.core.types import ImageArray
+from standoff.stages.detect.letterbox import Letterbox, Preprocessing
 
 sides = st.integers(1, 4000)
 input_sides = st.integers(1, 40).map(lambda count: 32 * count)
@@ -69,3 +70,36 @@ def test_colours_are_red_first_between_0_and_1_and_the_rest_is_grey() -> None:
     assert (seen[0, 1:, 8:24] == 0).all()
     assert (seen[0, :, :8] == 0.5).all()
     assert (seen[0, :, 24:] == 0.5).all()
+
+
+def _random_picture(seed: int, size_px: tuple[int, int]) -> ImageArray:
+    return np.random.default_rng(seed).integers(0, 256, (size_px[1], size_px[0], 3), dtype=np.uint8)
+
+
+@pytest.mark.parametrize("source", [(64, 32), (40, 80), (96, 96)])
+def test_a_picture_at_the_top_left_is_what_yolox_wants(source: tuple[int, int]) -> None:
+    box = Letterbox.fit(source, (96, 96), "top-left")
+    picture = _random_picture(0, box.inner_size_px)
+    expected = np.full((96, 96, 3), 114, np.float32)
+    expected[: picture.shape[0], : picture.shape[1]] = picture
+    seen = box.network_input(picture, Preprocessing("bgr", 255.0, placement="top-left", pad=114.0))
+    np.testing.assert_array_equal(seen[0], expected.transpose(2, 0, 1))
+    inner = box.to_source(np.array([[0.0, 0.0, *box.inner_size_px]], np.float64))
+    np.testing.assert_allclose(inner, [[-0.5, -0.5, source[0] - 0.5, source[1] - 0.5]])
+
+
+def test_a_stretched_picture_fills_the_input_and_its_boxes_come_back() -> None:
+    box = Letterbox.fit((300, 90), (64, 96), "stretch")
+    assert box.inner_size_px == (64, 96)
+    np.testing.assert_allclose(box.to_source(np.array([[32.0, 24.0, 64.0, 48.0]])), [[149.5, 22.0, 299.5, 44.5]])
+
+
+def test_mean_and_standard_deviation_are_those_of_each_channel() -> None:
+    mean, std = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
+    picture = _random_picture(1, (64, 32))
+    seen = Letterbox.fit((64, 32), (64, 64), "centre").network_input(
+        picture, Preprocessing(mean=mean, std=std, pad=0.0)
+    )
+    expected = (picture[:, :, ::-1] / 255.0 - mean) / std
+    np.testing.assert_allclose(seen[0, :, 16:48].transpose(1, 2, 0), expected, atol=1e-6)
+    np.testing.assert_allclose(seen[0, :, 0, 0], -np.array(mean) / std, rtol=1e-6)

@@ -6,8 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from standoff.core.homography import FloatArray
 from standoff.core.types import Detections
-from standoff.stages.detect.suppression import join_cut, suppress
+from standoff.stages.detect.suppression import join_cut, prefer_finer, suppress
 
 
 def _random_detections(seed: int, count: int) -> Detections:
@@ -86,3 +87,50 @@ def test_a_piece_that_hardly_overlaps_stays() -> None:
 
 def test_joining_nothing_gives_nothing() -> None:
     assert len(join_cut(Detections.empty(), np.zeros(0, np.bool_), 0.6)) == 0
+
+
+COARSE, FINE, NEIGHBOUR = (10.0, 10.0, 20.0, 30.0), (13.0, 14.0, 23.0, 38.0), (21.0, 10.0, 31.0, 30.0)
+
+
+def test_a_coarse_box_gives_way_to_the_finer_box_of_the_same_thing_and_leaves_its_score() -> None:
+    detections = _detections([COARSE, FINE, NEIGHBOUR], [0.9, 0.5, 0.4], [0, 0, 0])
+    preferred, kept = prefer_finer(detections, np.array([True, False, True]), np.array([False, True, False]), 0.2)
+    assert kept.tolist() == [False, True, True], "the neighbour overlaps the finer box by less"
+    np.testing.assert_array_equal(preferred.score, [0.9, 0.9, 0.4])
+    np.testing.assert_array_equal(preferred.xyxy_px, detections.xyxy_px)
+
+
+@pytest.mark.parametrize(
+    ("is_coarse", "is_fine", "classes"),
+    [
+        pytest.param((True, False), (False, True), [0, 1], id="of another class"),
+        pytest.param((True, False), (False, False), [0, 0], id="no box is fine"),
+        pytest.param((False, False), (False, True), [0, 0], id="no box is coarse"),
+    ],
+)
+def test_nothing_else_gives_way(is_coarse: tuple[bool, bool], is_fine: tuple[bool, bool], classes: list[int]) -> None:
+    detections = _detections([COARSE, FINE], [0.9, 0.5], classes)
+    preferred, kept = prefer_finer(detections, np.array(is_coarse), np.array(is_fine), 0.2)
+    assert kept.all()
+    np.testing.assert_array_equal(preferred.score, [0.9, 0.5])
+
+
+@given(st.integers(0, 10**6), st.integers(0, 40))
+def test_what_gives_way_overlaps_a_finer_box_that_is_at_least_as_sure_afterwards(seed: int, count: int) -> None:
+    detections = _random_detections(seed, count)
+    is_coarse = np.random.default_rng(seed).random(count) < 0.5
+    preferred, kept = prefer_finer(detections, is_coarse, ~is_coarse, 0.2)
+    assert kept[~is_coarse].all()
+    for index in np.flatnonzero(is_coarse):
+        own = ~is_coarse & (detections.class_id == detections.class_id[index])
+        iou = [_iou(detections.xyxy_px[index], box) for box in detections.xyxy_px[own]]
+        assert kept[index] == (max(iou, default=0.0) < 0.2)
+        if not kept[index]:
+            assert preferred.score[own][int(np.argmax(iou))] >= detections.score[index]
+
+
+def _iou(one: FloatArray, other: FloatArray) -> float:
+    width = max(0.0, min(one[2], other[2]) - max(one[0], other[0]))
+    height = max(0.0, min(one[3], other[3]) - max(one[1], other[1]))
+    areas = [(box[2] - box[0]) * (box[3] - box[1]) for box in (one, other)]
+    return float(width * height / (sum(areas) - width * height))

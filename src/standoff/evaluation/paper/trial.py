@@ -83,11 +83,11 @@ def build_monitor(clip: Clip, trial: Trial, source: Source) -> Pipeline:
     settings = settings_for(clip, trial)
     detector: Detector
     tracker: Tracker
-    if settings.model is None:
-        detector = tracker = TrueBoxes(clip, trial.box_error if trial.detector == "noisy" else None, trial.seed)
-    else:
+    if isinstance(trial.detector, Path):
         detector, tracker = build_stage("detect", settings), build_stage("track", settings)
-        _check_reference_class(detector, settings.model)
+        _check_reference_class(detector, trial.detector)
+    else:
+        detector = tracker = TrueBoxes(clip, trial.box_error if trial.detector == "noisy" else None, trial.seed)
     return Pipeline(
         frames=source,
         detector=detector,
@@ -120,8 +120,9 @@ def settings_for(clip: Clip, trial: Trial) -> Settings:
         "ground": ground,
         "locate": {"anchor": trial.anchor_used},
         "proximity": {"outlier_filter": "paper"},
-        "model": str(trial.detector) if isinstance(trial.detector, Path) else None,
     }
+    if isinstance(trial.detector, Path):
+        overrides["model"] = str(trial.detector)
     return load_settings(clip.folder / "reference.yaml", overrides)
 
 

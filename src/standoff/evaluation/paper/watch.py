@@ -20,6 +20,7 @@ from standoff.evaluation.paper.truth_detector import without_reference
 from standoff.evaluation.paper.turning import Turning
 from standoff.evaluation.rectification import FAILURE_PX
 from standoff.stages.frames import Source, open_source
+from standoff.stages.ground import ReferenceShape
 from standoff.stages.track.association import assign, overlaps
 
 NOT_VISIBLE = "not visible"
@@ -29,7 +30,8 @@ MIN_OVERLAP = 0.3
 """Smallest IoU of a box with the truth's for the two to be the same thing."""
 
 _ROLE = np.array([site_class.role.value for site_class in CLASSES])
-_NOTHING = -1
+NOTHING = -1
+"""In place of a row where there is none."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,7 +100,9 @@ def watch(clip: Clip, trial: Trial, on_frame: Callable[[], None] | None = None) 
     """
     with open_clip_video(clip) as source:
         monitor = build_monitor(clip, trial, source)
-        notes = _Notes(clip, trial, source.size_px)
+        reference = settings_for(clip, trial).ground.reference
+        assert reference is not None, "checked in settings_for"
+        notes = Notes(clip, reference.shape(), source.size_px, true_ids=not isinstance(trial.detector, Path))
         with closing(monitor.run()) as results:
             for result in results:
                 check_frame(clip, result.frame.index)
@@ -139,19 +143,30 @@ def _length_error(clip: Clip, found: str) -> DataError:
     )
 
 
-class _Notes:
-    """Takes each frame's result and files it under what is really there."""
+class Notes:
+    """Takes each frame's result and files it under what is really there.
 
-    def __init__(self, clip: Clip, trial: Trial, size_px: tuple[int, int]) -> None:
-        reference = settings_for(clip, trial).ground.reference
-        assert reference is not None and clip.reference is not None, "checked in settings_for"
+    Args:
+        clip: With a reference object.
+        shape: Of the reference object as the monitor was told, in the site frame.
+        size_px: (width, height) of the pictures.
+        true_ids: Whether the tracks carry the entities' own ids; otherwise they are matched by overlap.
+    """
+
+    def __init__(self, clip: Clip, shape: ReferenceShape, size_px: tuple[int, int], *, true_ids: bool) -> None:
+        assert clip.reference is not None, "only such clips are watched"
         self.watched = Watched.blank(clip, size_px)
         self.taken = 0
         self._clip, self._true_px = clip, clip.reference.corners_px
-        self._turning = Turning(reference.shape(), clip.reference.corners_m)
-        self._true_ids = not isinstance(trial.detector, Path)
+        self._turning = Turning(shape, clip.reference.corners_m)
+        self._true_ids = true_ids
 
-    def take(self, result: FrameResult) -> None:
+    def take(self, result: FrameResult) -> IntArray:
+        """File a frame.
+
+        Returns:
+            (E,) row of each entity's track among the result's tracks, or NOTHING.
+        """
         frame, watched = result.frame.index, self.watched
         self.taken += 1
         watched.ground_s[frame] = result.stage_ms["ground"] / 1e3
@@ -162,7 +177,7 @@ class _Notes:
         else:
             track_row = self._rows_by_overlap(frame, tracks.xyxy_px, tracks.class_id)
             detection_row = self._rows_by_overlap(frame, detections.xyxy_px, detections.class_id)
-        detected, tracked = detection_row != _NOTHING, track_row != _NOTHING
+        detected, tracked = detection_row != NOTHING, track_row != NOTHING
         watched.detected_px[frame, detected] = detections.xyxy_px[detection_row[detected]]
         xy_m = self._turning.to_site(result.positions.xy_m[track_row[tracked]], turn)
         watched.xy_m[frame, tracked] = xy_m
@@ -170,6 +185,7 @@ class _Notes:
         watched.reason[frame, ~tracked] = NOT_DETECTED
         watched.reason[frame, np.isnan(self._clip.box_px[frame]).any(axis=1)] = NOT_VISIBLE
         self._take_distances(result, track_row)
+        return track_row
 
     def _take_map(self, result: FrameResult) -> int:
         """File what is known of the map; return the turn that brings its positions to the site frame."""
@@ -197,20 +213,20 @@ class _Notes:
         near = result.proximities
         rows = {pair: k for k, pair in enumerate(zip(near.track_a.tolist(), near.track_b.tolist(), strict=True))}
         for column, ends in enumerate(self._clip.pairs):
-            if (track_row[ends] != _NOTHING).all():
+            if (track_row[ends] != NOTHING).all():
                 first, second = sorted(result.tracks.track_id[track_row[ends]].tolist())
                 if (first, second) in rows:
                     self.watched.distance_m[result.frame.index, column] = near.distance_m[rows[first, second]]
 
     def _rows_by_id(self, track_id: IntArray) -> IntArray:
         """Return (E,) the row of each entity under its own id, or -1."""
-        row_of = np.full(len(self._clip.entity_id), _NOTHING)
+        row_of = np.full(len(self._clip.entity_id), NOTHING)
         row_of[np.searchsorted(self._clip.entity_id, track_id)] = np.arange(len(track_id))
         return row_of
 
     def _rows_by_overlap(self, frame: int, boxes_px: FloatArray, class_id: IntArray) -> IntArray:
         """Return (E,) the row of the box that covers each visible entity, or -1."""
-        row_of = np.full(len(self._clip.entity_id), _NOTHING)
+        row_of = np.full(len(self._clip.entity_id), NOTHING)
         visible = np.flatnonzero(np.isfinite(self._clip.box_px[frame]).all(axis=1))
         similarity = overlaps(self._clip.box_px[frame, visible], boxes_px)
         similarity *= _ROLE[self._clip.class_id[visible]][:, None] == _ROLE[class_id]

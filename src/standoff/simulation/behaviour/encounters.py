@@ -17,8 +17,9 @@ _LONGEST_LEAD_S = 40.0
 
 
 def crossing_behind(
-    rng: np.random.Generator, machine: Model, worker: Model, place: Place, duration_s: float, *, closest_m: float = 4.0
-) -> tuple[Motion, Motion]:
+    rng: np.random.Generator, machine: Model, worker: Model, place: Place, duration_s: float, *, closest_m: float = 4.0,
+    to_left: bool | None = None,
+) -> tuple[Motion, Motion]:  # fmt: skip
     """Let a worker cross behind a reversing machine, just before it gets there.
 
     Args:
@@ -28,11 +29,12 @@ def crossing_behind(
         place: Where the machine starts; it backs away from its heading.
         duration_s: Of the motion; the crossing is near its middle.
         closest_m: Least distance of their centres.
+        to_left: Whether the worker walks to the left, as the machine looks; None draws it.
 
     Returns:
         Motions of machine and worker.
     """
-    return _crossing(rng, machine, worker, place, duration_s, closest_m, reverse=True)
+    return _crossing(rng, machine, worker, place, duration_s, closest_m, reverse=True, to_left=to_left)
 
 
 def near_miss(
@@ -44,13 +46,15 @@ def near_miss(
 
 def _crossing(
     rng: np.random.Generator, machine: Model, worker: Model, place: Place, duration_s: float, closest_m: float, *,
-    reverse: bool,
+    reverse: bool, to_left: bool | None = None,
 ) -> tuple[Motion, Motion]:  # fmt: skip
     sign = -1.0 if reverse else 1.0
     length_m = rng.uniform(16.0, 22.0)
     driven = driving_through(rng, machine, place, place.moved(sign * length_m), duration_s, reverse=reverse)
     meeting = place.moved(sign * length_m * rng.uniform(0.45, 0.6))
     side, away_m = float(rng.choice([-1.0, 1.0])), closest_m + rng.uniform(6.0, 9.0)
+    if to_left is not None:
+        side = 1.0 if to_left else -1.0
     ends = [meeting.moved(rng.normal(0.0, 0.8), side * s * away_m) for s in (-1.0, 1.0)]
     walked = walk([(end.x_m, end.y_m) for end in ends], rng.uniform(1.0, 1.6))
     return driven, fitted(_delayed_to_miss(driven, walked, closest_m), worker)

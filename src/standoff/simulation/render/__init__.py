@@ -4,6 +4,6 @@
 """
 
 from standoff.simulation.render.look import Look
-from standoff.simulation.render.renderer import Rendered, Renderer
+from standoff.simulation.render.renderer import Cutout, Rendered, Renderer
 
-__all__ = ["Look", "Rendered", "Renderer"]
+__all__ = ["Cutout", "Look", "Rendered", "Renderer"]

@@ -36,7 +36,10 @@ class ColourPass:
         lit = "light.glsl"
         self._things = InstanceDrawer(context, build_program(context, ("instances.vert",), (lit, "instances.frag")))
         self._ground_depth = build_program(context, ("depth_ground.vert",), ("nothing.frag",))
-        self._ground = context.vertex_array(build_program(context, ("fullscreen.vert",), (lit, "ground.frag")), [])
+        self._ground, self._matte = (
+            context.vertex_array(build_program(context, ("fullscreen.vert",), (lit, fragment)), [])
+            for fragment in ("ground.frag", "matte.frag")
+        )
         self._ground_copy = build_program(context, ("depth_ground.vert",), ("ground_copy.frag",))
         self._sky = context.vertex_array(build_program(context, ("fullscreen.vert",), (lit, "sky.frag")), [])
         self._noise = upload_with_mipmaps(context, make_noise(), smooth=False)
@@ -44,9 +47,13 @@ class ColourPass:
 
     def draw(
         self, targets: Targets, frustum: Frustum, visible: Instances, arena: Arena, relief: Relief, shadow: ShadowMap,
-        sun: dict[str, object],
+        sun: dict[str, object], *, cut_out: bool = False,
     ) -> None:  # fmt: skip
-        """Fill `targets.colour`; `sun` are the uniforms of `sun_uniforms`."""
+        """Fill `targets.colour`; `sun` are the uniforms of `sun_uniforms`.
+
+        Cut out, there is neither ground nor sky: alpha is 1 on things, and on the ground the share of light that they
+        take away.
+        """
         units = {
             "openness": targets.smooth, "noise": self._noise, "picture": relief.picture, "slopes": relief.slopes,
             "ground_depth": targets.ground_depth, "ground_radiance": targets.ground,
@@ -62,28 +69,28 @@ class ColourPass:
             "openness_scale": tuple(1.0 / (OPENNESS_STEP_PX * length) for length in targets.small_px),
             "depth_range": (NEAR_M, FAR_M),
         }
-        sky, ground, copy = self._sky.program, self._ground.program, self._ground_copy
-        for program in (self._things.program, sky, ground, copy, self._ground_depth):
+        ground = self._matte if cut_out else self._ground
+        for program in (self._things.program, self._sky.program, ground.program, self._ground_copy, self._ground_depth):
             set_uniforms(program, values)
         shadow.use(_UNITS["shadow_map"], _UNITS["shadow_depth"])
         for name, texture in units.items():
             texture.use(_UNITS[name])
-        self._light_ground(targets, frustum, relief)
-        self._draw_samples(targets, frustum, visible, arena, relief)
+        self._light_ground(targets, frustum, relief, ground)
+        self._draw_samples(targets, frustum, visible, arena, relief, sky=not cut_out)
         shadow.unuse(_UNITS["shadow_map"], _UNITS["shadow_depth"])
         self._context.copy_framebuffer(targets.resolved, targets.colour_pass)
 
-    def _light_ground(self, targets: Targets, frustum: Frustum, relief: Relief) -> None:
+    def _light_ground(self, targets: Targets, frustum: Frustum, relief: Relief, ground: Any) -> None:  # noqa: ANN401
         self._context.enable_only(self._context.DEPTH_TEST)
         targets.ground_depth_pass.use()
         targets.ground_depth_pass.clear(depth=1.0)
         relief.draw(self._ground_depth, frustum)
         self._context.enable_only(self._context.NOTHING)
         targets.ground_pass.use()
-        self._ground.render(vertices=3)
+        ground.render(vertices=3)
 
     def _draw_samples(
-        self, targets: Targets, frustum: Frustum, visible: Instances, arena: Arena, relief: Relief
+        self, targets: Targets, frustum: Frustum, visible: Instances, arena: Arena, relief: Relief, *, sky: bool
     ) -> None:
         context = self._context
         context.enable_only(context.DEPTH_TEST)
@@ -91,9 +98,10 @@ class ColourPass:
         targets.colour_pass.clear(depth=1.0)
         self._things.draw(visible, arena)
         relief.draw(self._ground_copy, frustum)
-        context.depth_func = "<="
-        self._sky.render(vertices=3)
-        context.depth_func = "<"
+        if sky:
+            context.depth_func = "<="
+            self._sky.render(vertices=3)
+            context.depth_func = "<"
 
 
 def sun_uniforms(light: Light, box: SunBox, shadow: ShadowMap, frustum: Frustum) -> dict[str, object]:

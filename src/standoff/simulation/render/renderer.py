@@ -38,6 +38,21 @@ class Rendered:
     ids: npt.NDArray[np.uint16]
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Cutout:
+    """Things and their shadows without the ground, to be laid over a photograph.
+
+    Attributes:
+        light: (H, W, 4) linear red, green, blue and alpha: what lies below shows through by 1 - alpha, and the colours
+            are to be added. Alpha is 1 on things, and in their shadows the share of light that they take from level
+            ground; edges are smooth.
+        ids: (H, W) uint16 as in `Rendered`.
+    """
+
+    light: npt.NDArray[np.float32]
+    ids: npt.NDArray[np.uint16]
+
+
 class Renderer:
     """Draws one scene after another.
 
@@ -103,7 +118,29 @@ class Renderer:
         if self._relief is None:
             raise RuntimeError("load a scene before rendering")
         with self._context:
-            return self._draw(view, batches, light, look, self._relief)
+            targets, frustum = self._draw(view, batches, light, self._relief)
+            return Rendered(*self._development.develop(targets, frustum, look))
+
+    def cut_out(self, view: View, batches: Sequence[Batch], light: Light) -> Cutout:
+        """Draw the loaded scene without ground and sky; the ground only takes shadows.
+
+        Args:
+            view: Its camera has the renderer's size and a lens without distortion.
+            batches: What moves, where it is now.
+            light: Sun, sky, haze.
+        """
+        if self._relief is None or view.camera.distortion.any():
+            raise ValueError("load a scene first, and take a camera without distortion")
+        with self._context:
+            targets, frustum = self._draw(view, batches, light, self._relief, cut_out=True)
+            width, height = targets.size_px
+            colour = np.frombuffer(targets.resolved.read(components=4, dtype="f2"), np.float16)
+            ids = np.frombuffer(targets.id_pass.read(components=1, dtype="u2", alignment=1), np.uint16)
+        left, top = (-origin for origin in frustum.origin_px)
+        shown = np.s_[top : top + view.camera.height_px, left : left + view.camera.width_px]
+        return Cutout(
+            colour.reshape(height, width, 4)[shown].astype(np.float32), ids.reshape(height, width)[shown].copy()
+        )
 
     def silhouette_px(self, view: View, batches: Sequence[Batch]) -> int:
         """Count the pixels that the batches alone would cover, nothing in front of them.
@@ -114,7 +151,9 @@ class Renderer:
         with self._context:
             return self._ids.count_silhouette(view, batches, self._arena)
 
-    def _draw(self, view: View, batches: Sequence[Batch], light: Light, look: Look, relief: Relief) -> Rendered:
+    def _draw(
+        self, view: View, batches: Sequence[Batch], light: Light, relief: Relief, *, cut_out: bool = False
+    ) -> tuple[Targets, Frustum]:
         lens_map = self._development.lens_map(view.camera)
         frustum = Frustum(view, lens_map.origin_px, lens_map.size_px)
         targets = self._targets_of(lens_map.size_px)
@@ -126,8 +165,8 @@ class Renderer:
         self._ids.draw(frustum, visible, self._arena, relief)
         self._openness.draw(targets, frustum)
         sun = sun_uniforms(light, box, self._shadow, frustum)
-        self._colour.draw(targets, frustum, visible, self._arena, relief, self._shadow, sun)
-        return Rendered(*self._development.develop(targets, frustum, look))
+        self._colour.draw(targets, frustum, visible, self._arena, relief, self._shadow, sun, cut_out=cut_out)
+        return targets, frustum
 
     def _targets_of(self, size_px: tuple[int, int]) -> Targets:
         if self._targets is None or self._targets.size_px != size_px:

@@ -9,5 +9,14 @@ from standoff.stages.detect.class_map import DEFAULT_CLASS_MAP
 from standoff.stages.detect.detector import OnnxDetector
 from standoff.stages.detect.params import DetectParams
 from standoff.stages.detect.runtime import available_providers
+from standoff.stages.detect.shipped import SHIPPED_MODELS, ShippedModel, find_model
 
-__all__ = ["DEFAULT_CLASS_MAP", "DetectParams", "OnnxDetector", "available_providers"]
+__all__ = [
+    "DEFAULT_CLASS_MAP",
+    "SHIPPED_MODELS",
+    "DetectParams",
+    "OnnxDetector",
+    "ShippedModel",
+    "available_providers",
+    "find_model",
+]

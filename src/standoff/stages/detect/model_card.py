@@ -3,9 +3,9 @@
 The metadata of the file holds one text a key: `standoff_format`, and as JSON `classes`, `anchors_px`,
 `input_size_px`, `preprocessing`, `output` and `sources`. The graph has one input and one output:
 
-- input `picture`: (1, 3, height, width) float32, RGB, 0 to 1, the picture letterboxed: scaled to fit without
+- input `picture`: (1, 3, height, width) float32 or float16, RGB, 0 to 1, the picture letterboxed: scaled to fit without
   changing its aspect ratio, in the middle, the rest 0.5 as in Darknet;
-- output `boxes`: (1, N, 5 + classes) float32: centre x, y, width, height in input pixels, where 0 is the left or
+- output `boxes`: (1, N, 5 + classes): centre x, y, width, height in input pixels, where 0 is the left or
   top edge of the first pixel; objectness; the probability of each class given an object.
 """
 
@@ -20,6 +20,7 @@ from typing import Any, Final
 
 from standoff.core.errors import ModelError
 
+FORMAT_KEY: Final = "standoff_format"
 FORMAT: Final = "1"
 INPUT_NAME: Final = "picture"
 OUTPUT_NAME: Final = "boxes"
@@ -54,7 +55,7 @@ class ModelCard:
             "output": OUTPUT_COLUMNS,
             "sources": dict(self.sources),
         }
-        return {"standoff_format": FORMAT, **{key: json.dumps(value) for key, value in fields.items()}}
+        return {FORMAT_KEY: FORMAT, **{key: json.dumps(value) for key, value in fields.items()}}
 
     @classmethod
     def from_metadata(cls, metadata: Mapping[str, str], name: str) -> ModelCard:
@@ -71,12 +72,12 @@ class ModelCard:
         >>> ModelCard.from_metadata(card.to_metadata(), "m.onnx") == card
         True
         """
-        if "standoff_format" not in metadata:
+        if FORMAT_KEY not in metadata:
             raise ModelError(
                 expected=f"a model exported by standoff at {name}", found="an ONNX file without its metadata", fix=_FIX
             )
-        if metadata["standoff_format"] != FORMAT:
-            found = f"format '{metadata['standoff_format']}'"
+        if metadata[FORMAT_KEY] != FORMAT:
+            found = f"format '{metadata[FORMAT_KEY]}'"
             raise ModelError(expected=f"model format {FORMAT} in {name}", found=found, fix=_FIX)
         try:
             return cls._from_fields({key: json.loads(metadata[key]) for key in _FIELDS}, name)

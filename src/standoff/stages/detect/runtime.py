@@ -27,7 +27,7 @@ _CHAINS: Final = {
 _AUTO: Final = ("cuda", "cpu")
 """OpenVINO must be asked for: on some processors it computes in bfloat16 without saying so."""
 _ERRORS_ONLY: Final = 3
-_LOAD_ERRORS: Final = (
+ONNX_ERRORS: Final = (
     runtime_errors.Fail,
     runtime_errors.InvalidArgument,
     runtime_errors.InvalidGraph,
@@ -36,6 +36,7 @@ _LOAD_ERRORS: Final = (
     runtime_errors.NotImplemented,
     runtime_errors.RuntimeException,
 )
+"""What ONNX Runtime raises for a file or a picture that it cannot use."""
 
 
 def available_providers() -> tuple[str, ...]:
@@ -82,7 +83,7 @@ def open_session(path: Path, provider: Provider, intra_op_threads: int) -> onnxr
     names = [_PROVIDERS[name][0] for name in _CHAINS[chosen]]
     try:
         session = onnxruntime.InferenceSession(str(path), options, providers=names)
-    except _LOAD_ERRORS as error:
+    except ONNX_ERRORS as error:
         raise ModelError(
             expected=f"an ONNX model at {path}",
             found=f"what ONNX Runtime cannot load ({str(error)[:120]})",

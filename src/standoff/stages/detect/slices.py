@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -28,19 +29,19 @@ class View:
     height_px: int
     frame_size_px: tuple[int, int]
 
-    def is_cut(self, xyxy_px: FloatArray, margin_px: float) -> BoolArray:
+    def is_cut(self, xyxy_px: FloatArray, margin_px: tuple[float, float]) -> BoolArray:
         """Tell which boxes end at a border of the view that is not a border of the frame.
 
         Args:
             xyxy_px: (N, 4) in frame pixels.
-            margin_px: How near to the border is at the border.
+            margin_px: How near to the border is at the border: across, and up or down.
 
         Returns:
             (N,).
         """
         edges_px = np.array([self.left_px, self.top_px, self.left_px + self.width_px, self.top_px + self.height_px])
         frame_edges_px = np.array([0, 0, *self.frame_size_px])
-        near = np.abs(xyxy_px - (edges_px - 0.5)) <= margin_px
+        near = np.abs(xyxy_px - (edges_px - 0.5)) <= np.array([*margin_px, *margin_px])
         cut: BoolArray = (near & (edges_px != frame_edges_px)).any(axis=1)
         return cut
 
@@ -70,3 +71,16 @@ def views(frame_size_px: tuple[int, int], slices: tuple[int, int], overlap: floa
     lefts, width_px = _starts_and_length(frame_size_px[0], slices[0], overlap)
     tops, height_px = _starts_and_length(frame_size_px[1], slices[1], overlap)
     return whole, *(View(left, top, width_px, height_px, frame_size_px) for top in tops for left in lefts)
+
+
+def held_whole_px(frame_size_px: tuple[int, int], slices: tuple[int, int], overlap: float) -> tuple[int, int]:
+    """Return the (width, height) up to which some slice shows a thing whole, wherever it is.
+
+    >>> held_whole_px((1800, 900), (2, 1), 0.2)
+    (200, 900)
+    """
+    width_px, height_px = (
+        min([length_px, *(start + length_px - following for start, following in pairwise(starts))])
+        for starts, length_px in map(_starts_and_length, frame_size_px, slices, (overlap, overlap))
+    )
+    return width_px, height_px

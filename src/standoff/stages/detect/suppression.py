@@ -1,4 +1,4 @@
-"""One box for each thing: suppress duplicates, and join what slices cut apart."""
+"""One box for each thing: suppress duplicates, join what slices cut apart, prefer what was seen larger."""
 
 from __future__ import annotations
 
@@ -38,15 +38,47 @@ def suppress(detections: Detections, iou: float, limit: int) -> Detections:
 
 
 def _areas(xyxy: FloatArray) -> FloatArray:
-    areas: FloatArray = (xyxy[..., 2] - xyxy[..., 0]) * (xyxy[..., 3] - xyxy[..., 1])
+    areas: FloatArray = (xyxy[:, 2] - xyxy[:, 0]) * (xyxy[:, 3] - xyxy[:, 1])
     return areas
 
 
-def _overlap_of_smaller(box: FloatArray, boxes: FloatArray) -> FloatArray:
-    corners = np.concatenate([np.maximum(box[:2], boxes[:, :2]), np.minimum(box[2:], boxes[:, 2:])], axis=1)
-    corners[:, 2:] = np.maximum(corners[:, 2:], corners[:, :2])
-    overlap: FloatArray = _areas(corners) / np.minimum(_areas(box), _areas(boxes))
-    return overlap
+def _intersections(one: FloatArray, other: FloatArray) -> FloatArray:
+    """Areas shared by each of (N, 4) with each of (M, 4): (N, M)."""
+    sides = np.minimum(one[:, None, 2:], other[:, 2:]) - np.maximum(one[:, None, :2], other[:, :2])
+    shared: FloatArray = np.maximum(sides, 0.0).prod(axis=2)
+    return shared
+
+
+def prefer_finer(
+    detections: Detections, is_coarse: BoolArray, is_fine: BoolArray, least_iou: float
+) -> tuple[Detections, BoolArray]:
+    """Let coarsely seen boxes give way to finely seen ones of the same thing.
+
+    A thing of few pixels gets so rough a box that it overlaps its finer box too little to be suppressed as its
+    duplicate. The finer box stays where it is, with the higher score of the two.
+
+    Args:
+        detections: Boxes of all views, without zero areas.
+        is_coarse: (N,) True for those that may give way.
+        is_fine: (N,) True for those that they give way to.
+        least_iou: Overlap from which two boxes of a class are the same thing.
+
+    Returns:
+        The detections with the scores, and (N,) False for those that gave way.
+    """
+    coarse, fine = np.flatnonzero(is_coarse), np.flatnonzero(is_fine)
+    kept, score = np.ones(len(detections), dtype=np.bool_), detections.score.copy()
+    if not len(coarse) or not len(fine):
+        return detections, kept
+    boxes = detections.xyxy_px
+    shared = _intersections(boxes[coarse], boxes[fine])
+    iou = shared / (_areas(boxes[coarse])[:, None] + _areas(boxes[fine]) - shared)
+    iou[detections.class_id[coarse][:, None] != detections.class_id[fine]] = 0.0
+    nearest = iou.argmax(axis=1)
+    gives_way = iou[np.arange(len(coarse)), nearest] >= least_iou
+    np.maximum.at(score, fine[nearest[gives_way]], detections.score[coarse[gives_way]])
+    kept[coarse[gives_way]] = False
+    return replace(detections, score=score), kept
 
 
 def join_cut(detections: Detections, cut: BoolArray, least_overlap: float) -> Detections:
@@ -68,17 +100,18 @@ def join_cut(detections: Detections, cut: BoolArray, least_overlap: float) -> De
     detections, cut = detections[largest_first], cut[largest_first]
     boxes, score = detections.xyxy_px.copy(), detections.score.copy()
     kept = np.ones(len(detections), dtype=np.bool_)
-    for index in range(len(detections)):
-        if not kept[index]:
+    pieces = np.flatnonzero(cut)
+    smaller = np.minimum(_areas(boxes)[:, None], _areas(boxes[pieces]))
+    is_piece_of = _intersections(boxes, boxes[pieces]) / smaller >= least_overlap
+    is_piece_of &= detections.class_id[:, None] == detections.class_id[pieces]
+    is_piece_of &= pieces > np.arange(len(boxes))[:, None]
+    for index in np.flatnonzero(is_piece_of.any(axis=1)):
+        own = pieces[is_piece_of[index] & kept[pieces]]
+        if not kept[index] or not len(own):
             continue
-        pieces = cut & kept & (detections.class_id == detections.class_id[index])
-        pieces[: index + 1] = False
-        pieces[pieces] = _overlap_of_smaller(boxes[index], boxes[pieces]) >= least_overlap
-        if not pieces.any():
-            continue
-        kept &= ~pieces
-        score[index] = max(score[index], score[pieces].max())
+        kept[own] = False
+        score[index] = max(score[index], score[own].max())
         if cut[index]:
-            boxes[index, :2] = np.minimum(boxes[index, :2], boxes[pieces, :2].min(axis=0))
-            boxes[index, 2:] = np.maximum(boxes[index, 2:], boxes[pieces, 2:].max(axis=0))
+            boxes[index, :2] = np.minimum(boxes[index, :2], boxes[own, :2].min(axis=0))
+            boxes[index, 2:] = np.maximum(boxes[index, 2:], boxes[own, 2:].max(axis=0))
     return replace(detections, xyxy_px=boxes, score=score)[kept]

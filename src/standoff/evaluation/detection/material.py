@@ -1,0 +1,196 @@
+"""What detectors are tried on: labelled pictures, a simulated clip, or a video with boxes of people."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from standoff.core.classes import CLASS_BY_NAME
+from standoff.core.errors import ConfigError, DataError
+from standoff.core.homography import BoolArray, FloatArray
+from standoff.core.types import Frame, IntArray
+from standoff.evaluation.paper.clip import Clip, load_clip
+from standoff.evaluation.paper.clip_tables import read_table
+from standoff.evaluation.positions_input import read_truth
+from standoff.labels import load_picture, read_data
+from standoff.labels.site_classes import to_site_classes
+from standoff.labels.types import LabelledPicture, Split
+from standoff.stages.frames import frame_from_array, open_source
+
+_VISIBLE = ("frame", "entity_id", "class_id", "x1_px", "y1_px", "x2_px", "y2_px", "visible_share", "visible_px")
+_LEAST_SHARE, _LEAST_PX, _PLAIN_PX = 0.15, 16, 1500
+"""Of an entity: hidden more than that and small, or smaller than that, it is ignored, as nobody would mark it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Material:
+    """Pictures with what is in them; class ids are those of `CLASSES`.
+
+    Attributes:
+        name: For people.
+        truth: Of each picture.
+        frames: Starts to read the pictures, in the order of `truth`.
+        frame_index: (N,) position of each in its video; of each picture in the split without one.
+        clip: The simulated clip that they are from; None otherwise.
+    """
+
+    name: str
+    truth: tuple[LabelledPicture, ...]
+    frames: Callable[[], Iterator[Frame]]
+    frame_index: IntArray
+    clip: Clip | None = None
+
+
+def labelled_pictures(path: Path, split: Split, limit: int | None = None) -> Material:
+    """Take one split of a data set.
+
+    Args:
+        path: What `standoff.labels.read_data` reads.
+        split: Which.
+        limit: Take so many pictures only, evenly spread; None: all.
+
+    Raises:
+        DataError: It cannot be read, or the split has no picture.
+    """
+    data = to_site_classes(read_data(path))
+    pictures = data.splits.get(split, ())
+    if not pictures:
+        counts = ", ".join(f"{len(some)} in {name}" for name, some in data.splits.items() if some)
+        raise DataError(
+            expected=f"pictures in the split {split} of {path}",
+            found=counts or "no picture at all",
+            fix="choose another split with --split" if counts else "check the path",
+        )
+    chosen = _spread(len(pictures), limit)
+    truth = tuple(pictures[row] for row in chosen)
+
+    def frames() -> Iterator[Frame]:
+        for index, picture in enumerate(truth):
+            yield frame_from_array(load_picture(picture), index=index, stream_id=picture.path.name)
+
+    return Material(f"{path.resolve().name}, {split}", truth, frames, chosen)
+
+
+def simulated_clip(folder: Path, limit: int | None = None) -> Material:
+    """Take a folder that `standoff simulate` wrote.
+
+    Args:
+        folder: Of the clip.
+        limit: Take so many frames only, evenly spread; None: all.
+
+    Raises:
+        DataError: It is not a clip.
+        SourceError: Its video cannot be read.
+    """
+    clip = load_clip(folder)
+    rows = read_table(folder / "truth.parquet", _VISIBLE)
+    seen = rows["visible_px"] > 0
+    boxes_px = np.column_stack([rows[name] for name in ("x1_px", "y1_px", "x2_px", "y2_px")]).astype(np.float64)
+    hidden = (rows["visible_share"] < _LEAST_SHARE) & (rows["visible_px"] < _PLAIN_PX)
+    ignored = hidden | (rows["visible_px"] < _LEAST_PX)
+    chosen = _spread(clip.frame_count, limit)
+    size_px = _size_px(clip.video)
+    truth = []
+    for frame in chosen:
+        here = seen & (rows["frame"] == frame)
+        truth.append(_in_video(clip.video, size_px, boxes_px[here], rows["class_id"][here], ignored[here]))
+    return Material(clip.name, tuple(truth), lambda: _video_frames(clip.video, chosen), chosen, clip)
+
+
+def video_with_people(
+    csv: Path, video: Path, frames: tuple[int, int] | None = None, limit: int | None = None
+) -> Material:
+    """Take a video with a MOT table of people.
+
+    Args:
+        csv: `frame,id,x,y,w,h,conf,X,Y`, frames from 1; what has conf 0 is ignored.
+        video: It belongs to.
+        frames: First and last to take; None: all between the first and the last of the table.
+        limit: Take so many frames only, evenly spread; None: all.
+
+    Raises:
+        DataError: The table cannot be read, or has no boxes or nobody in these frames.
+        SourceError: The video cannot be read.
+    """
+    rows = read_truth(csv)
+    first, last = frames or (int(rows["frame"].min(initial=1)), int(rows["frame"].max(initial=1)))
+    inside = (rows["frame"] >= first) & (rows["frame"] <= last) & np.isfinite(rows["x"])
+    if not (inside & (rows["conf"] > 0)).any():
+        raise DataError(
+            expected=f"boxes of people in the frames {first}-{last} of {csv}",
+            found="none",
+            fix="choose other frames with --frames, or another file",
+        )
+    boxes_px = np.column_stack([rows["x"], rows["y"], rows["x"] + rows["w"], rows["y"] + rows["h"]])
+    people = np.full(len(boxes_px), CLASS_BY_NAME["worker"].id)
+    chosen = _spread(last - first + 1, limit) + first - 1
+    size_px = _size_px(video)
+    truth = []
+    for frame in chosen:
+        here = inside & (rows["frame"] == frame + 1)
+        truth.append(_in_video(video, size_px, boxes_px[here], people[here], rows["conf"][here] <= 0))
+    return Material(f"{video.name}, frames {first}-{last}", tuple(truth), lambda: _video_frames(video, chosen), chosen)
+
+
+def open_material(
+    path: Path, *, split: Split, video: Path | None, frames: tuple[int, int] | None, limit: int | None
+) -> Material:
+    """Take whatever kind of data there is at a path: a clip folder, a CSV table with its video, or labelled pictures.
+
+    Raises:
+        ConfigError: A table has no video, or a video or a choice of frames has no table.
+        DataError: The data cannot be used.
+        SourceError: The video cannot be read.
+    """
+    if path.suffix.lower() == ".csv":
+        if video is None:
+            raise ConfigError(expected=f"--video FILE with {path}", found="none", fix="say which video it belongs to")
+        return video_with_people(path, video, frames, limit)
+    if video is not None or frames is not None:
+        raise ConfigError(
+            expected="a CSV table with --video and --frames", found=f"{path}", fix="leave --video and --frames out"
+        )
+    if (path / "truth.parquet").is_file():
+        return simulated_clip(path, limit)
+    return labelled_pictures(path, split, limit)
+
+
+def _spread(count: int, limit: int | None) -> IntArray:
+    """Return positions of all, or of `limit` evenly spread ones."""
+    return np.unique(np.linspace(0, count - 1, min(count, limit or count)).round().astype(np.int64))
+
+
+def _size_px(video: Path) -> tuple[int, int]:
+    with open_source(video) as source:
+        return source.size_px
+
+
+def _in_video(
+    video: Path, size_px: tuple[int, int], boxes_px: FloatArray, class_id: IntArray, ignored: BoolArray
+) -> LabelledPicture:
+    """Return a frame of a video, its boxes clipped to the picture, those outside it left out."""
+    edges_px = np.array([*size_px, *size_px]) - 0.5
+    inside_px = np.clip(boxes_px, -0.5, edges_px)
+    kept = (inside_px[:, 2:] > inside_px[:, :2]).all(axis=1)
+    return LabelledPicture(
+        path=video,
+        size_px=size_px,
+        xyxy_px=inside_px[kept],
+        class_id=class_id[kept].astype(np.int64),
+        ignored=ignored[kept],
+        group=video.stem,
+        source=video.stem,
+    )
+
+
+def _video_frames(video: Path, chosen: IntArray) -> Iterator[Frame]:
+    wanted = set(chosen.tolist())
+    with open_source(video) as source:
+        for frame in source:
+            if frame.index in wanted:
+                yield frame
+            if frame.index >= chosen[-1]:
+                return

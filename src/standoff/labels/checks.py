@@ -1,0 +1,99 @@
+"""From what a data set says to what holds: classes mapped, boxes inside the picture, nothing twice or contradictory."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from standoff.core.homography import BoolArray, FloatArray
+from standoff.core.types import IntArray
+from standoff.labels.source import BadPicture, SourcePicture
+from standoff.labels.types import Problem
+
+_ROUNDING_PX: Final = 1.0
+"""Boxes at the picture's edge stick out by this much because they were rounded; that is no mistake."""
+_MIN_SIDE_PX: Final = 0.5
+_SAME_PX: Final = 0.01
+"""YOLO's six digits are 0.002 px of a 2000 px picture."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CheckedBoxes:
+    """Boxes of one picture that can be learned from.
+
+    Attributes:
+        xyxy_px: (N, 4) inside the picture.
+        class_id: (N,).
+        ignored: (N,).
+        problems: What was dropped or mended.
+    """
+
+    xyxy_px: FloatArray
+    class_id: IntArray
+    ignored: BoolArray
+    problems: tuple[Problem, ...]
+
+
+def check_boxes(picture: SourcePicture, class_ids: Mapping[str, int | None]) -> CheckedBoxes:
+    """Map the labels of a picture and mend its boxes.
+
+    Args:
+        picture: As its set marks it.
+        class_ids: Of each label that is kept; None: the label's boxes are ignored regions. Others are dropped.
+
+    Raises:
+        BadPicture: One box has two classes.
+    """
+    kept = np.array([label in class_ids for label in picture.labels], np.bool_)
+    ids = [class_ids[label] for label in picture.labels if label in class_ids]
+    class_id = np.array([0 if number is None else number for number in ids], np.int64)
+    ignored = picture.ignored[kept] | np.array([number is None for number in ids], np.bool_)
+    xyxy_px = picture.xyxy_px[kept]
+
+    first = _first_of_each(picture, xyxy_px, class_id, ignored)
+    cut_px = inside(xyxy_px, picture.size_px)
+    real = _has_area(xyxy_px)
+    visible = real & _has_area(cut_px)
+    cut = visible & (np.abs(cut_px - xyxy_px).max(axis=1, initial=0.0) > _ROUNDING_PX)
+    faults = (
+        (~first, "box marked twice"),
+        (first & ~real, "box without area"),
+        (first & real & ~visible, "box outside the picture"),
+        (first & cut, "box cut at the picture's edge"),
+    )
+    problems = tuple(_mended(picture, int(where.sum()), kind) for where, kind in faults if where.any())
+    good = first & visible
+    return CheckedBoxes(cut_px[good], class_id[good], ignored[good], problems)
+
+
+def inside(xyxy_px: FloatArray, size_px: tuple[int, int]) -> FloatArray:
+    """Return (N, 4) boxes cut at the edges of a picture.
+
+    >>> inside(np.array([[-3.0, 2.0, 9.0, 20.0]]), (8, 10)).tolist()
+    [[-0.5, 2.0, 7.5, 9.5]]
+    """
+    return np.clip(xyxy_px, -0.5, np.tile(size_px, 2) - 0.5)
+
+
+def _first_of_each(picture: SourcePicture, xyxy_px: FloatArray, class_id: IntArray, ignored: BoolArray) -> BoolArray:
+    """Return False for repetitions of a box; ignored regions may repeat one."""
+    first = np.ones(len(xyxy_px), np.bool_)
+    seen: dict[tuple[float, ...], int] = {}
+    for row, corners in enumerate(np.rint(xyxy_px / _SAME_PX).tolist()):
+        if ignored[row]:
+            continue
+        first[row] = tuple(corners) not in seen
+        if seen.setdefault(tuple(corners), int(class_id[row])) != class_id[row]:
+            raise BadPicture(picture.path, "one box with two classes", "contradictory labels")
+    return first
+
+
+def _has_area(xyxy_px: FloatArray) -> BoolArray:
+    return np.asarray((xyxy_px[:, 2:] - xyxy_px[:, :2]).min(axis=1, initial=np.inf) >= _MIN_SIDE_PX)
+
+
+def _mended(picture: SourcePicture, count: int, kind: str) -> Problem:
+    return Problem(picture.path, f"{kind} ({count})", kind, skipped_picture=False)

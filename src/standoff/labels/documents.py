@@ -1,0 +1,58 @@
+"""YAML and JSON files of settings and labels, read with errors that name the file."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from standoff.core.errors import DataError
+
+
+def read_yaml(path: Path) -> dict[str, Any]:
+    """Read names and values from a YAML file.
+
+    Raises:
+        DataError: It cannot be read, is not YAML, or holds something else.
+    """
+    try:
+        content = yaml.safe_load(_read_text(path))
+    except yaml.YAMLError as error:
+        raise DataError(expected=f"YAML in {path}", found=str(error), fix="correct the file") from error
+    return _checked(content, path, "YAML")
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """Read names and values from a JSON file.
+
+    Raises:
+        DataError: It cannot be read, is not JSON, or holds something else.
+    """
+    try:
+        content = json.loads(_read_text(path))
+    except (json.JSONDecodeError, RecursionError) as error:
+        raise DataError(expected=f"JSON in {path}", found=str(error), fix="export it again") from error
+    return _checked(content, path, "JSON")
+
+
+def _read_text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise DataError(
+            expected=f"a readable file at {path}", found=str(error.strerror), fix="check the path"
+        ) from error
+    except UnicodeDecodeError as error:
+        raise DataError(expected=f"UTF-8 text in {path}", found=str(error), fix="save it as UTF-8") from error
+
+
+def _checked(content: object, path: Path, language: str) -> dict[str, Any]:
+    if not isinstance(content, dict):
+        raise DataError(
+            expected=f"names and values as {language} in {path}",
+            found=type(content).__name__,
+            fix="give a mixture file, a data.yaml or a COCO file",
+        )
+    return content

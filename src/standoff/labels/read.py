@@ -1,0 +1,211 @@
+"""Read labelled pictures from whatever they come in."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from standoff.core.errors import DataError
+from standoff.core.homography import FloatArray
+from standoff.labels.checks import check_boxes, inside
+from standoff.labels.documents import read_yaml
+from standoff.labels.layout import YAML_SUFFIXES, read_negatives, read_set
+from standoff.labels.mixture import DROP, IGNORE, Mixture, Source, read_mixture
+from standoff.labels.source import BadPicture, SourcePicture, SourceSet
+from standoff.labels.splits import group_of, split_pictures
+from standoff.labels.types import SPLITS, LabelledData, LabelledPicture, Problem, Split
+
+_OWN_REGIONS: Final = "ignore.yaml"
+"""In a set's folder: the regions that it says itself nothing is known of, as simulated composites have them."""
+_NOWHERE: Final = np.zeros((0, 4))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Place:
+    """Where a picture belongs."""
+
+    source: Source
+    group: str
+    regions_px: FloatArray
+
+
+def read_data(path: Path) -> LabelledData:
+    """Read labelled pictures; of the pictures themselves only the headers.
+
+    Args:
+        path: Folder of a YOLO, COCO or Pascal VOC data set, its data.yaml or COCO file, or a mixture file that
+            lists several (see docs/labelled-data.md).
+
+    Raises:
+        DataError: It is none of these, contradicts itself, or more than half of a set's pictures cannot be used.
+    """
+    mixture = _open_mixture(path)
+    sets = [_read_source(source) for source in mixture.sources]
+    maps = [_map_labels(source, one) for source, one in zip(mixture.sources, sets, strict=True)]
+    kept = [name for names in maps for name in names.values() if name not in (IGNORE, DROP)]
+    classes = mixture.classes or tuple(dict.fromkeys(kept))
+    if not classes:
+        raise DataError(expected=f"classes in {path}", found="none", fix="add a set with labels, or `classes`")
+    splits: dict[Split, list[LabelledPicture]] = {split: [] for split in SPLITS}
+    problems: list[Problem] = []
+    for source, one, names in zip(mixture.sources, sets, maps, strict=True):
+        class_ids = _class_ids(source, names, one, classes)
+        pictures, found = _check_source(source, one, class_ids, mixture.seed)
+        problems += found
+        for split in SPLITS:
+            splits[split] += pictures[split]
+    return LabelledData(classes, {split: tuple(pictures) for split, pictures in splits.items()}, problems)
+
+
+def _open_mixture(path: Path) -> Mixture:
+    if path.is_file() and path.suffix.lower() in YAML_SUFFIXES and "sources" in read_yaml(path):
+        return read_mixture(path)
+    return Mixture([Source(path, path.resolve().name)])
+
+
+def _read_source(source: Source) -> SourceSet:
+    if source.negatives:
+        return read_negatives(source.path)
+    return read_set(source.path, source.names, source.pictures)
+
+
+def _map_labels(source: Source, one: SourceSet) -> dict[str, str]:
+    """Return what becomes of each label: a class, `ignore` or `drop`."""
+    unknown = sorted(set(source.class_map) - set(one.labels) - {"*"})
+    if unknown:
+        raise DataError(
+            expected=f"labels of '{source.name}' in its class map ({', '.join(one.labels)})",
+            found=", ".join(unknown),
+            fix="correct the class map",
+        )
+    return {label: source.class_map.get(label, source.class_map.get("*", label)) for label in one.labels}
+
+
+def _class_ids(
+    source: Source, names: Mapping[str, str], one: SourceSet, classes: Sequence[str]
+) -> dict[str, int | None]:
+    """Return the class id of each label, None where ignored, nothing where dropped."""
+    used = {label for picture in one.pictures for label in picture.labels}
+    strange = sorted(label for label in used if names[label] not in (*classes, IGNORE, DROP))
+    if strange:
+        raise DataError(
+            expected=f"labels of '{source.name}' that are classes ({', '.join(classes)})",
+            found=", ".join(strange),
+            fix=f"say in its `class_map` what they are: a class, {IGNORE} or {DROP}",
+        )
+    ids: dict[str, int | None] = {name: number for number, name in enumerate(classes)} | {IGNORE: None}
+    return {label: ids[name] for label, name in names.items() if name in ids}
+
+
+def _check_source(
+    source: Source, one: SourceSet, class_ids: Mapping[str, int | None], seed: int
+) -> tuple[dict[Split, list[LabelledPicture]], list[Problem]]:
+    """Return the good pictures of each split, and what was wrong with the others."""
+    regions = _read_regions(source)
+    groups = [group_of(picture, source.group) for picture in one.pictures]
+    places = split_pictures(source, one.pictures, groups, seed)
+    split_of = _splits_of_groups(groups, places)
+    splits: dict[Split, list[LabelledPicture]] = {split: [] for split in SPLITS}
+    problems = [*one.problems, *_cut_groups(source, split_of), *_lost_regions(source, regions, one)]
+    for picture, group, split in zip(one.pictures, groups, places, strict=True):
+        if split is None:
+            problems.append(Problem(picture.path, "in none of the splits", "picture in no split", skipped_picture=True))
+            continue
+        # cut by the set's own splits, a group is two, so that no group is in two splits
+        name = f"{source.name}/{group}" if len(split_of[group]) == 1 else f"{source.name}/{group} ({split})"
+        try:
+            labelled, mended = _label(
+                picture, _Place(source, name, regions.get(picture.path.stem, _NOWHERE)), class_ids
+            )
+        except BadPicture as error:
+            problems.append(error.problem)
+            continue
+        splits[split].append(labelled)
+        problems += mended
+    _require_enough(source, sum(map(len, splits.values())), problems)
+    return splits, problems
+
+
+def _splits_of_groups(groups: Sequence[str], splits: Sequence[Split | None]) -> dict[str, list[Split]]:
+    pairs = set(zip(groups, splits, strict=True))
+    return {group: [split for split in SPLITS if (group, split) in pairs] for group in dict.fromkeys(groups)}
+
+
+def _cut_groups(source: Source, split_of: Mapping[str, Sequence[Split]]) -> list[Problem]:
+    return [
+        Problem(source.path, f"'{group}' is in {' and '.join(found)}", "group in two splits", skipped_picture=False)
+        for group, found in split_of.items()
+        if len(found) > 1
+    ]
+
+
+def _lost_regions(source: Source, regions: Mapping[str, FloatArray], one: SourceSet) -> list[Problem]:
+    known = {picture.path.stem for picture in one.pictures} | {problem.path.stem for problem in one.problems}
+    return [
+        Problem(source.path, f"'{stem}' is no picture", "ignored region of no picture", skipped_picture=False)
+        for stem in regions
+        if stem not in known
+    ]
+
+
+def _label(
+    picture: SourcePicture, place: _Place, class_ids: Mapping[str, int | None]
+) -> tuple[LabelledPicture, tuple[Problem, ...]]:
+    boxes = check_boxes(picture, class_ids)
+    regions_px = inside(place.regions_px, picture.size_px)
+    regions_px = regions_px[(regions_px[:, :2] < regions_px[:, 2:]).all(axis=1)]
+    labelled = LabelledPicture(
+        picture.path,
+        picture.size_px,
+        np.concatenate([boxes.xyxy_px, regions_px]),
+        np.concatenate([boxes.class_id, np.zeros(len(regions_px), np.int64)]),
+        np.concatenate([boxes.ignored, np.ones(len(regions_px), np.bool_)]),
+        place.group,
+        place.source.name,
+        place.source.weight,
+    )
+    return labelled, boxes.problems
+
+
+def _read_regions(source: Source) -> dict[str, FloatArray]:
+    """Return (N, 4) boxes in which nothing is known, by the stem of the picture."""
+    folder = source.path if source.path.is_dir() else source.path.parent
+    path = source.ignore_regions or folder / _OWN_REGIONS
+    if source.ignore_regions is None and not path.is_file():
+        return {}
+    regions = {str(stem): _corners(boxes) for stem, boxes in read_yaml(path).items()}
+    wrong = sorted(stem for stem, boxes in regions.items() if boxes is None)
+    if wrong:
+        raise DataError(
+            expected=f"[[x1, y1, x2, y2], ...] of each picture in {path}",
+            found=f"something else for {', '.join(wrong)}",
+            fix="correct the file",
+        )
+    return {stem: boxes for stem, boxes in regions.items() if boxes is not None}
+
+
+def _corners(boxes: object) -> FloatArray | None:
+    try:
+        corners = np.array(boxes, dtype=np.float64).reshape(-1, 4)
+    except (TypeError, ValueError):
+        return None
+    return corners if np.isfinite(corners).all() and (corners[:, :2] < corners[:, 2:]).all() else None
+
+
+def _require_enough(source: Source, good: int, problems: Sequence[Problem]) -> None:
+    kinds = Counter(problem.kind for problem in problems if problem.skipped_picture)
+    skipped = kinds.total()
+    if good >= skipped and good > 0:
+        return
+    examples = [next(problem for problem in problems if problem.kind == kind) for kind, _ in kinds.most_common(3)]
+    reasons = [f"{one.kind} ({kinds[one.kind]}, as {one.path}: {one.found})" for one in examples]
+    raise DataError(
+        expected=f"pictures with labels in '{source.name}', most of them usable",
+        found=f"{good} usable and {skipped} not: {'; '.join(reasons)}" if reasons else "no picture",
+        fix="repair or remove them",
+    )

@@ -1,0 +1,45 @@
+"""Labelled pictures under the classes of the site, whatever their own are called."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from standoff.core.classes import CLASS_BY_NAME, CLASSES
+from standoff.core.errors import DataError, ModelError
+from standoff.labels.types import LabelledData, LabelledPicture
+from standoff.stages.detect.class_map import map_classes
+
+
+def to_site_classes(data: LabelledData) -> LabelledData:
+    """Rename classes to those of the site ("person" is a worker), and drop boxes of anything else.
+
+    What a detector finds where a box was dropped is a false alarm: a tree is not a worker.
+
+    Returns:
+        The same pictures; class ids are those of `standoff.core.classes.CLASSES`.
+
+    Raises:
+        DataError: None of the classes is one of the site.
+    """
+    try:
+        site_names = map_classes(data.classes, {}, "the labelled pictures")
+    except ModelError as error:
+        raise DataError(
+            expected=error.expected, found=error.found, fix="map them in the `class_map` of a mixture file"
+        ) from error
+    ids = np.array([CLASS_BY_NAME[site_names[name]].id if name in site_names else -1 for name in data.classes])
+
+    def renamed(picture: LabelledPicture) -> LabelledPicture:
+        class_id = ids[picture.class_id]
+        kept = picture.ignored | (class_id >= 0)
+        return replace(
+            picture,
+            xyxy_px=picture.xyxy_px[kept],
+            class_id=np.maximum(class_id[kept], 0),
+            ignored=picture.ignored[kept],
+        )
+
+    splits = {split: tuple(map(renamed, pictures)) for split, pictures in data.splits.items()}
+    return LabelledData(tuple(site_class.name for site_class in CLASSES), splits, data.problems)

@@ -1,0 +1,105 @@
+"""What the files of one data set say, before anything is checked or mapped."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, TypeVar
+
+from standoff.core.homography import BoolArray, FloatArray
+from standoff.labels.types import Problem, Split
+
+_Item = TypeVar("_Item")
+
+_SPLIT_WORDS: Final[tuple[tuple[str, Split], ...]] = (
+    ("train", "train"),
+    ("training", "train"),
+    ("val", "val"),
+    ("valid", "val"),
+    ("validation", "val"),
+    ("test", "test"),
+    ("testing", "test"),
+)
+
+
+class BadPicture(Exception):
+    """One picture that cannot be used; the others can.
+
+    Args:
+        path: File that is wrong.
+        found: What is wrong with it.
+        kind: The same words for the same kind of problem.
+    """
+
+    def __init__(self, path: Path, found: str, kind: str) -> None:
+        self.problem = Problem(path, found, kind, skipped_picture=True)
+        super().__init__(f"{path}: {found}")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SourcePicture:
+    """One picture as its data set marks it.
+
+    Attributes:
+        path: Of the picture.
+        size_px: (width, height) as stored.
+        labels: One for each box, in the set's own words.
+        xyxy_px: (N, 4) as marked, possibly outside the picture; 0 is the centre of the first pixel.
+        ignored: (N,) True where the set says that nothing is known.
+        split: Where the set puts it; None: it does not say.
+        scene: What the set calls its scene; empty: it does not say.
+    """
+
+    path: Path
+    size_px: tuple[int, int]
+    labels: tuple[str, ...]
+    xyxy_px: FloatArray
+    ignored: BoolArray
+    split: Split | None = None
+    scene: str = ""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SourceSet:
+    """A data set as it is on disk.
+
+    Attributes:
+        labels: All that it may use, in its own order.
+        pictures: In a fixed order.
+        problems: Pictures that could not be read.
+    """
+
+    labels: tuple[str, ...]
+    pictures: Sequence[SourcePicture]
+    problems: Sequence[Problem]
+
+
+def read_each(
+    items: Iterable[_Item], read: Callable[[_Item], SourcePicture]
+) -> tuple[list[SourcePicture], list[Problem]]:
+    """Read picture after picture; one that is bad, or that came before, becomes a problem and stops nothing."""
+    pictures: dict[Path, SourcePicture] = {}
+    problems: list[Problem] = []
+    for item in items:
+        try:
+            picture = read(item)
+        except BadPicture as error:
+            problems.append(error.problem)
+            continue
+        if picture.path in pictures:
+            problems.append(Problem(picture.path, "listed twice", "picture listed twice", skipped_picture=True))
+        else:
+            pictures[picture.path] = picture
+    return list(pictures.values()), problems
+
+
+def split_named(name: str) -> Split | None:
+    """Return the split that a folder's or file's name means.
+
+    >>> split_named("instances_val2017"), split_named("valid"), split_named("labels")
+    ('val', 'val', None)
+    """
+    word = re.sub(r"^instances_|\d+$", "", name.lower())
+    return dict(_SPLIT_WORDS).get(word)

@@ -1,0 +1,73 @@
+"""Labelled pictures: what training learns from and what detectors are scored on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, get_args
+
+from standoff.core.homography import BoolArray, FloatArray
+from standoff.core.types import IntArray
+
+Split = Literal["train", "val", "test"]
+SPLITS: tuple[Split, ...] = get_args(Split)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LabelledPicture:
+    """One picture and what is marked in it.
+
+    Attributes:
+        path: Of the picture.
+        size_px: (width, height).
+        xyxy_px: (N, 4) left, top, right, bottom edges, inside the picture; 0 is the centre of the first pixel, so that
+            a box over the whole picture is -0.5 to width - 0.5.
+        class_id: (N,) position in `LabelledData.classes`; whatever it says does not count where `ignored`.
+        ignored: (N,) True for a region of which nothing is known: crowds, difficult objects, things that the source
+            does not label. Neither finding something there nor missing it is wrong.
+        group: Scene, flight or video that it belongs to; no group is in two splits.
+        source: Name of the data set.
+        weight: How often it is drawn in training, relative to others.
+    """
+
+    path: Path
+    size_px: tuple[int, int]
+    xyxy_px: FloatArray
+    class_id: IntArray
+    ignored: BoolArray
+    group: str
+    source: str
+    weight: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """Something wrong with a picture or its labels, and what became of it.
+
+    Attributes:
+        path: File that it is in.
+        found: What is wrong, in a few words ("class id 9, of 7 classes").
+        kind: For counting: the same words for the same kind of problem.
+        skipped_picture: True if the picture is left out; otherwise only the box was dropped or mended.
+    """
+
+    path: Path
+    found: str
+    kind: str
+    skipped_picture: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LabelledData:
+    """Pictures of one or more data sets, under one list of classes.
+
+    Attributes:
+        classes: Names; `class_id` is a position in it.
+        splits: The pictures of each split, in a fixed order; a split may be empty.
+        problems: What was wrong, in the order found.
+    """
+
+    classes: tuple[str, ...]
+    splits: dict[Split, tuple[LabelledPicture, ...]]
+    problems: Sequence[Problem]

@@ -1,0 +1,193 @@
+"""YOLO folders: pictures, and beside each a text file of lines `class centre-x centre-y width height`.
+
+The four numbers are shares of the picture, counted from the left and upper *edge* of the first pixel; ours are 0 at
+its centre, half a pixel further.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from standoff.core.errors import DataError
+from standoff.core.homography import FloatArray
+from standoff.labels.documents import read_yaml
+from standoff.labels.pictures import find_pictures, first_file, read_size_px
+from standoff.labels.source import BadPicture, SourcePicture, SourceSet, read_each, split_named
+from standoff.labels.types import SPLITS, Split
+
+_NAME_FILES: Final = ("classes.txt", "obj.names", "labels/classes.txt")
+_Listed = tuple[Path, Split | None]
+
+
+def read_yolo_yaml(path: Path, names: Sequence[str] | None) -> SourceSet:
+    """Read a data set by its data.yaml: `names`, and a folder or list of pictures for each split.
+
+    Args:
+        path: The file.
+        names: Labels by class id; None: those of the file.
+
+    Raises:
+        DataError: The file, a folder or a list of it cannot be used.
+    """
+    content = read_yaml(path)
+    labels = tuple(names) if names is not None else labels_of(content.get("names"), path)
+    root = path.parent / str(content.get("path", "."))
+    listed: list[_Listed] = []
+    for key in ("train", "val", "valid", "test"):
+        places = content.get(key) or ()
+        for place in places if isinstance(places, (list, tuple)) else (places,):
+            listed += [(picture, split_named(key)) for picture in _pictures_at(root, path.parent, str(place), path)]
+    if not listed:
+        raise DataError(
+            expected=f"{', '.join(SPLITS)} in {path}", found="no pictures", fix="name folders or lists of pictures"
+        )
+    return _read_listed(listed, labels)
+
+
+def read_yolo_folder(folder: Path, names: Sequence[str] | None) -> SourceSet:
+    """Read a folder without data.yaml: label files beside the pictures, or `images` and `labels` side by side.
+
+    Args:
+        folder: Searched with everything below it; folders named after a split mean that split.
+        names: Labels by class id; None: from classes.txt or obj.names.
+
+    Raises:
+        DataError: No names.
+    """
+    listed = [(picture, _split_of(picture.relative_to(folder))) for picture in find_pictures(folder)]
+    return _read_listed(listed, tuple(names) if names is not None else _read_names(folder))
+
+
+def labels_of(names: object, path: Path) -> tuple[str, ...]:
+    """Return labels by class id, from a list or from a mapping of id to label.
+
+    Args:
+        names: As YAML gives it.
+        path: Of the YAML, for messages.
+
+    Raises:
+        DataError: Something else, or ids with gaps.
+
+    >>> labels_of({1: "car", 0: "person"}, Path("data.yaml"))
+    ('person', 'car')
+    """
+    if isinstance(names, list) and names:
+        return tuple(str(name) for name in names)
+    if isinstance(names, Mapping) and names:
+        by_id = _by_id(names)
+        if sorted(by_id) == list(range(len(by_id))):
+            return tuple(by_id[number] for number in range(len(by_id)))
+    raise DataError(
+        expected=f"`names` in {path}: a list of labels, or a mapping from class ids 0, 1, 2 ... to labels",
+        found=repr(names),
+        fix="write down the labels in the order of their ids",
+    )
+
+
+def _by_id(names: Mapping[Any, Any]) -> dict[int, str]:
+    try:
+        return {int(number): str(name) for number, name in names.items()}
+    except (TypeError, ValueError):
+        return {}
+
+
+def _read_names(folder: Path) -> tuple[str, ...]:
+    for name in _NAME_FILES:
+        if (folder / name).is_file():
+            lines = (folder / name).read_text(encoding="utf-8-sig", errors="replace").splitlines()
+            labels = tuple(line.strip() for line in lines if line.strip())
+            if labels:
+                return labels
+    raise DataError(
+        expected=f"the labels of the YOLO folder {folder} in data.yaml, classes.txt or obj.names",
+        found="none of them",
+        fix="write classes.txt, one label a line in the order of their ids, or give `names` in a mixture file",
+    )
+
+
+def _pictures_at(root: Path, beside: Path, place: str, path: Path) -> list[Path]:
+    """Return the pictures of a folder, or those that a text file lists."""
+    # Roboflow writes ../train/images for the folder train/images beside the file
+    for candidate in (root / place, root / place.removeprefix("../")):
+        if candidate.is_dir():
+            return find_pictures(candidate)
+        if candidate.is_file():
+            lines = candidate.read_text(encoding="utf-8-sig", errors="replace").splitlines()
+            return [_listed_picture(line.strip(), candidate.parent, (root, beside)) for line in lines if line.strip()]
+    raise DataError(
+        expected=f"the folder or list of pictures '{place}' that {path} names",
+        found=f"nothing at {root / place}",
+        fix="correct the path",
+    )
+
+
+def _listed_picture(line: str, parent: Path, roots: tuple[Path, ...]) -> Path:
+    return first_file([folder / line for folder in (parent, *roots)])
+
+
+def _split_of(relative: Path) -> Split | None:
+    return next((split for part in relative.parts[:-1] if (split := split_named(part))), None)
+
+
+def _read_listed(listed: Sequence[_Listed], labels: tuple[str, ...]) -> SourceSet:
+    pictures, problems = read_each(listed, partial(_read_picture, labels))
+    return SourceSet(labels, pictures, problems)
+
+
+def _read_picture(labels: tuple[str, ...], listed: _Listed) -> SourcePicture:
+    path, split = listed
+    size_px = read_size_px(path)
+    rows = _read_rows(_label_file(path))
+    unknown = [number for number in rows[:, 0] if number not in range(len(labels))]
+    if unknown:
+        raise BadPicture(path, f"class id {unknown[0]:g}, of {len(labels)} classes", "unknown class id")
+    return SourcePicture(
+        path,
+        size_px,
+        tuple(labels[int(number)] for number in rows[:, 0]),
+        _to_corners(rows[:, 1:], size_px),
+        np.zeros(len(rows), np.bool_),
+        split,
+    )
+
+
+def _label_file(picture: Path) -> Path:
+    """Return the label file: in `labels` where the picture is in `images`, else beside it."""
+    parts = list(picture.parts)
+    candidates = [picture.with_suffix(".txt")]
+    if "images" in parts[:-1]:
+        last = len(parts) - 2 - parts[-2::-1].index("images")
+        candidates.insert(0, Path(*parts[:last], "labels", *parts[last + 1 :]).with_suffix(".txt"))
+    file = first_file(candidates)
+    if not file.is_file():
+        raise BadPicture(picture, f"no label file at {file}", "label file missing")
+    return file
+
+
+def _read_rows(path: Path) -> FloatArray:
+    """Return (N, 5) numbers of a label file; an empty file has none."""
+    try:
+        lines = [line.split() for line in path.read_text(encoding="utf-8-sig").splitlines()]
+    except (OSError, UnicodeDecodeError) as error:
+        raise BadPicture(path, f"no text ({error})", "unreadable labels") from error
+    rows = [row for row in lines if row]
+    if any(len(row) != 5 for row in rows):
+        count = next(len(row) for row in rows if len(row) != 5)
+        raise BadPicture(path, f"a line of {count} values instead of 5", "unreadable labels")
+    try:
+        numbers = np.array(rows, dtype=np.float64).reshape(-1, 5)
+    except ValueError as error:
+        raise BadPicture(path, f"not a number ({error})", "unreadable labels") from error
+    if not np.isfinite(numbers).all():
+        raise BadPicture(path, "a number that is not finite", "unreadable labels")
+    return numbers
+
+
+def _to_corners(shares: FloatArray, size_px: tuple[int, int]) -> FloatArray:
+    centre_px, extent_px = shares[:, :2] * size_px, shares[:, 2:] * size_px
+    return np.hstack([centre_px - extent_px / 2, centre_px + extent_px / 2]) - 0.5

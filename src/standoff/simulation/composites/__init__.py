@@ -1,0 +1,1 @@
+"""Rendered machines, people and clutter, laid with their shadows over photographs of real ground."""

@@ -1,0 +1,187 @@
+"""Photographs of real ground: what is known of each, and which of them belong together."""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, get_args
+
+import numpy as np
+import yaml
+from PIL import Image
+
+from standoff.core.classes import CLASS_BY_NAME
+from standoff.core.errors import DataError
+from standoff.core.homography import FloatArray
+from standoff.core.types import IntArray
+from standoff.simulation.presets import Condition
+
+_SUFFIXES = (".jpg", ".jpeg", ".png")
+_CAR_M = 4.6
+_DAYLIGHT: tuple[Condition, ...] = ("noon", "afternoon", "hazy", "overcast")
+_PITCHES_DEG = {"nadir": 90.0, "oblique": 40.0}
+_IGNORE = "ignore"
+_KEYS = frozenset({"pictures", "view", "pitch_deg", "px_per_m", "light", "shadow_deg", "labels", "ignore_px", "group"})
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Background:
+    """A photograph.
+
+    Attributes:
+        path: Of the file.
+        group: Flight that it belongs to; what one flight shows is in one split only.
+        pitch_deg: Of the camera below the horizon: 90 looks straight down.
+        px_per_m: Pixels a metre in the middle of the photograph; None if nobody knows.
+        conditions: Kinds of light that it may have been taken in.
+        shadow_deg: Where shadows fall, clockwise from the photograph's upper edge; None if nobody knows.
+        xyxy_px: (N, 4) what is marked in it, 0 the centre of the first pixel.
+        class_id: (N,) of `standoff.core.classes`.
+        ignored_px: (M, 4) places with things that are not marked.
+    """
+
+    path: Path
+    group: str
+    pitch_deg: float
+    px_per_m: float | None
+    conditions: tuple[Condition, ...]
+    shadow_deg: float | None
+    xyxy_px: FloatArray
+    class_id: IntArray
+    ignored_px: FloatArray
+
+
+def find_backgrounds(sources: Sequence[str]) -> tuple[Background, ...]:
+    """Find the photographs.
+
+    Args:
+        sources: Each a folder, searched with all below, or a folder and how its pictures were taken, `DIR:nadir` or
+            `DIR:oblique`, or a YAML file as `docs/simulator.md` describes it.
+
+    Returns:
+        In the order of the sources, then by name.
+
+    Raises:
+        DataError: A source that cannot be read, or no photograph at all.
+    """
+    found: list[Background] = []
+    for source in sources:
+        if source.endswith((".yaml", ".yml")):
+            found += _listed(Path(source))
+        else:
+            folder, _, view = source.partition(":")
+            found += _described(_below(Path(folder)), {"view": view or "nadir"}, source)
+    if not found:
+        raise DataError(
+            expected="photographs of ground (.jpg, .png)", found=f"none in {', '.join(sources)}", fix="name a folder"
+        )
+    return tuple(found)
+
+
+def group_of(path: Path) -> str:
+    """Return the flight that a photograph belongs to: its name less the last number.
+
+    >>> [group_of(Path(name)) for name in ("DJI_0005-0018.jpg", "DJI_0031.JPG", "MOS76.png", "7.png")]
+    ['DJI_0005', 'DJI', 'MOS', 'photographs']
+    """
+    return re.sub(r"[-_ .]*\d+$", "", path.stem) or "photographs"
+
+
+def split_backgrounds(backgrounds: Sequence[Background], held_out: float) -> dict[str, tuple[Background, ...]]:
+    """Divide the flights among train, val and test: the smallest are held out, so that training sees most ground.
+
+    Args:
+        backgrounds: All.
+        held_out: Share of the flights for each of val and test, at least one if there are three; 0 holds nothing out.
+
+    Returns:
+        The photographs of each split; val and test are empty if nothing is held out.
+    """
+    flights: dict[str, list[Background]] = defaultdict(list)
+    for background in backgrounds:
+        flights[background.group].append(background)
+    by_size = sorted(flights, key=lambda group: (len(flights[group]), group))
+    apart = max(round(held_out * len(by_size)), 1) if held_out > 0.0 and len(by_size) >= 3 else 0
+    shares = {"val": by_size[:apart], "test": by_size[apart : 2 * apart], "train": by_size[2 * apart :]}
+    return {split: tuple(b for group in groups for b in flights[group]) for split, groups in shares.items()}
+
+
+def _below(folder: Path) -> list[Path]:
+    if not folder.is_dir():
+        raise DataError(expected="a folder of photographs", found=f"no folder {folder}", fix="check the path")
+    return sorted(path for path in folder.rglob("*") if path.suffix.lower() in _SUFFIXES)
+
+
+def _listed(file: Path) -> list[Background]:
+    try:
+        entries = yaml.safe_load(file.read_text())
+    except (OSError, yaml.YAMLError) as error:
+        raise DataError(
+            expected="a YAML list of backgrounds", found=f"{file}: {error}", fix="see docs/simulator.md"
+        ) from error
+    if not isinstance(entries, list):
+        raise DataError(expected="a YAML list of backgrounds", found=f"another thing in {file}", fix="begin with '- '")
+    found: list[Background] = []
+    for entry in entries:
+        paths = sorted(file.parent.glob(entry["pictures"])) if "pictures" in entry else []
+        if not paths:
+            raise DataError(expected="photographs under `pictures`", found=f"none in {file}", fix="check the pattern")
+        found += _described(paths, entry, str(file))
+    return found
+
+
+def _described(paths: Sequence[Path], entry: Mapping[str, Any], source: str) -> list[Background]:
+    unknown = sorted(set(entry) - _KEYS)
+    view, light = entry.get("view", "nadir"), tuple(entry.get("light", _DAYLIGHT))
+    wrong = unknown + [view] * (view not in _PITCHES_DEG) + [name for name in light if name not in get_args(Condition)]
+    if wrong:
+        raise DataError(
+            expected=f"{', '.join(sorted(_KEYS))}; views {', '.join(_PITCHES_DEG)}; light {get_args(Condition)}",
+            found=f"{', '.join(map(repr, wrong))} in {source}",
+            fix="correct it",
+        )
+    return [_background(path, entry, float(entry.get("pitch_deg", _PITCHES_DEG[view])), light) for path in paths]
+
+
+def _background(path: Path, entry: Mapping[str, Any], pitch_deg: float, light: tuple[Condition, ...]) -> Background:
+    xyxy_px, ids = np.empty((0, 4)), np.empty(0, np.int64)
+    ignored_px = np.array(entry.get("ignore_px", []), dtype=np.float64).reshape(-1, 4)
+    px_per_m = entry.get("px_per_m")
+    if entry.get("labels"):
+        boxes_px, names = _read_labels(path, entry["labels"])
+        ignored = np.array([name == _IGNORE for name in names], dtype=bool)
+        ignored_px = np.concatenate([ignored_px, boxes_px[ignored]])
+        xyxy_px = boxes_px[~ignored]
+        ids = np.array([CLASS_BY_NAME[name].id for name in names if name != _IGNORE], dtype=np.int64)
+        cars = xyxy_px[ids == CLASS_BY_NAME["vehicle"].id]
+        if px_per_m is None and len(cars):
+            px_per_m = float(np.median((cars[:, 2:] - cars[:, :2]).max(axis=1))) / _CAR_M
+    group = str(entry.get("group", group_of(path)))
+    return Background(path, group, pitch_deg, px_per_m, light, entry.get("shadow_deg"), xyxy_px, ids, ignored_px)
+
+
+def _read_labels(path: Path, names: Mapping[int, str]) -> tuple[FloatArray, list[str]]:
+    """Return the boxes (N, 4) of a YOLO label file beside `images/`, and what each is."""
+    file = path.parent.parent / "labels" / path.with_suffix(".txt").name
+    if not file.is_file():
+        raise DataError(expected="a photograph with a label file", found=f"no {file} to {path}", fix="check the folder")
+    size_px = _size_px(path)
+    rows = np.array([line.split()[:5] for line in file.read_text().splitlines() if line.strip()], dtype=np.float64)
+    rows = rows.reshape(-1, 5)
+    unknown = set(rows[:, 0].astype(int).tolist()) - set(names)
+    if unknown or not set(names.values()) <= {*CLASS_BY_NAME, _IGNORE}:
+        raise DataError(
+            expected=f"for each class of {file} one of {', '.join(CLASS_BY_NAME)} or {_IGNORE}",
+            found=f"{dict(names)}",
+            fix="name them under `labels`",
+        )
+    centre, half = rows[:, 1:3] * size_px, rows[:, 3:] * size_px / 2
+    return np.hstack([centre - half, centre + half]) - 0.5, [names[int(kind)] for kind in rows[:, 0]]
+
+
+def _size_px(path: Path) -> FloatArray:
+    with Image.open(path) as picture:
+        return np.array(picture.size, dtype=np.float64)

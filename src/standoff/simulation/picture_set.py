@@ -1,0 +1,119 @@
+"""A data set of labelled pictures on disk, in YOLO's or COCO's layout."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import yaml
+
+from standoff.core.classes import CLASSES
+from standoff.simulation.coco import Annotations
+from standoff.simulation.truth import Row
+
+SPLITS = ("train", "val", "test")
+_MIN_VISIBLE_PX, _MIN_SIDE_PX = 16, 6
+_MIN_VISIBLE_SHARE = 0.15
+_PLAIN_PX = 1500
+"""Of a machine is plain to see, however small a share of it that is."""
+
+Box = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Picture:
+    """One picture of a data set.
+
+    Attributes:
+        name: Of the file, without folder.
+        jpeg: Its content.
+        size_px: (width, height).
+        entities: What is marked in it: class and box as in `truth.TRUTH_SCHEMA`; COCO's layout also needs what is
+            visible.
+        ignored_px: Left, top, right, bottom of places of which nothing is known.
+        about: Further fields of the picture in COCO's layout.
+    """
+
+    name: str
+    jpeg: bytes
+    size_px: tuple[int, int]
+    entities: Sequence[Row]
+    ignored_px: Sequence[Box] = ()
+    about: Mapping[str, Any] = field(default_factory=dict)
+
+
+class PictureSet:
+    """Writes pictures with their labels, one by one.
+
+    Args:
+        folder: Empty.
+        layout: Of the annotations.
+    """
+
+    def __init__(self, folder: Path, layout: Literal["yolo", "coco"]) -> None:
+        self._folder, self._layout = folder, layout
+        self._annotations = {split: Annotations() for split in SPLITS}
+        self._ignored: dict[str, list[list[float]]] = {}
+        for split in SPLITS:
+            (folder / "images" / split).mkdir(parents=True)
+            if layout == "yolo":
+                (folder / "labels" / split).mkdir(parents=True)
+
+    def add(self, split: str, picture: Picture) -> None:
+        """Write a picture and, in YOLO's layout, its labels."""
+        (self._folder / "images" / split / picture.name).write_bytes(picture.jpeg)
+        if self._layout == "yolo":
+            label = self._folder / "labels" / split / Path(picture.name).with_suffix(".txt")
+            label.write_text("".join(yolo_line(row, picture.size_px) for row in picture.entities))
+        else:
+            entry = {"file_name": f"images/{split}/{picture.name}", **picture.about}
+            self._annotations[split].add(entry, picture.entities, picture.size_px, None)
+        if picture.ignored_px:
+            self._ignored[Path(picture.name).stem] = [[round(edge, 2) for edge in box] for box in picture.ignored_px]
+
+    def finish(self, description: str, settings: Mapping[str, Any]) -> None:
+        """Write what belongs to all pictures.
+
+        Args:
+            description: For COCO's layout.
+            settings: What the set was made with, for `dataset.json`.
+        """
+        if self._layout == "coco":
+            (self._folder / "annotations").mkdir()
+            for split in SPLITS:
+                text = json.dumps(self._annotations[split].to_dict(f"{description}, {split}"))
+                (self._folder / "annotations" / f"{split}.json").write_text(text)
+        if self._ignored:
+            (self._folder / "ignore.yaml").write_text(yaml.safe_dump(self._ignored, default_flow_style=None))
+        names = {site_class.id: site_class.name for site_class in CLASSES}
+        content = {**{split: f"images/{split}" for split in SPLITS}, "names": names}
+        (self._folder / "data.yaml").write_text(yaml.safe_dump(content, sort_keys=False))
+        (self._folder / "dataset.json").write_text(json.dumps(settings))
+
+
+def yolo_line(row: Row, size_px: tuple[int, int]) -> str:
+    r"""Return one line of a YOLO label file: class, centre and size as shares of the picture.
+
+    >>> yolo_line({"class_id": 2, "x1_px": -0.5, "y1_px": -0.5, "x2_px": 9.5, "y2_px": 4.5}, (20, 10))
+    '2 0.250000 0.250000 0.500000 0.500000\n'
+    """
+    left, top, right, bottom = (row[f"{name}_px"] + 0.5 for name in ("x1", "y1", "x2", "y2"))
+    width_px, height_px = size_px
+    shares = (
+        (left + right) / 2 / width_px,
+        (top + bottom) / 2 / height_px,
+        (right - left) / width_px,
+        (bottom - top) / height_px,
+    )
+    return f"{row['class_id']} " + " ".join(f"{share:.6f}" for share in shares) + "\n"
+
+
+def is_marked(row: Row) -> bool:
+    """Return whether somebody who marks pictures would mark an entity; the rest is too small or too hidden."""
+    side_px = max(row["x2_px"] - row["x1_px"], row["y2_px"] - row["y1_px"])
+    if row["visible_px"] < _MIN_VISIBLE_PX or side_px < _MIN_SIDE_PX:
+        return False
+    return bool(row["visible_share"] >= _MIN_VISIBLE_SHARE or row["visible_px"] >= _PLAIN_PX)

@@ -1,0 +1,184 @@
+"""What must be known of a network to use it, and the YAML file that says it of a foreign one.
+
+A model that `standoff export` or `standoff train` made says it all itself (`standoff.stages.detect.model_card`). Beside
+another `M.onnx` lies `M.yaml`:
+
+    family: yolox            # yolov3, yolox or detr (RT-DETR, D-FINE); see standoff.stages.detect.outputs
+    classes: coco.names      # a list, or a file with one label a line, beside this one; in the order of the outputs
+    input_size: 640x640      # width x height; only where the graph leaves it open
+    # What follows has the family's usual value where it is not given:
+    colour: bgr              # order of the channels: rgb or bgr
+    white: 255               # value of the brightest level: 1 or 255
+    mean: [0, 0, 0]          # subtracted from each channel, on that scale; then divided by std
+    std: [1, 1, 1]
+    placement: top-left      # of the scaled picture: centre, top-left, or stretch: fill the input
+    pad: 114                 # level around it, 0 to 255
+    outputs: {rows: output}  # only where shapes do not tell: rows, or boxes and logits, or boxes, labels and scores
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Final, Literal, get_args
+
+import yaml
+
+from standoff.core.errors import ModelError
+from standoff.stages.detect.letterbox import DARKNET, Colour, Placement, Preprocessing
+
+Family = Literal["yolov3", "yolox", "detr"]
+
+ROLES: Final = ("rows", "boxes", "logits", "labels", "scores")
+USUAL: Final[Mapping[Family, Preprocessing]] = {
+    "yolov3": DARKNET,
+    "yolox": Preprocessing(colour="bgr", white=255.0, placement="top-left", pad=114.0),
+    "detr": Preprocessing(placement="stretch"),
+}
+"""YOLOX: `preproc` of its repository, since version 0.1.1; RT-DETR and D-FINE: their training's Resize and ToTensor."""
+
+
+@dataclass(frozen=True, slots=True)
+class Interface:
+    """How to talk to a network.
+
+    Attributes:
+        family: What its outputs mean.
+        classes: Labels in the order of its outputs.
+        input_size_px: (width, height).
+        preprocessing: What it wants of a picture.
+        output_names: Role to name, where shapes do not tell.
+    """
+
+    family: Family
+    classes: tuple[str, ...]
+    input_size_px: tuple[int, int]
+    preprocessing: Preprocessing = DARKNET
+    output_names: Mapping[str, str] = field(default_factory=dict)
+
+
+def read_interface(path: Path, graph_size_px: tuple[int, int] | None) -> Interface:
+    """Read the description that lies beside a model.
+
+    Args:
+        path: YAML file.
+        graph_size_px: (width, height) where the graph fixes it.
+
+    Raises:
+        ModelError: The file cannot be read, does not fit the graph, or leaves something out.
+    """
+    try:
+        return _interface(_parsed(path), graph_size_px, path)
+    except (OSError, UnicodeDecodeError, yaml.YAMLError, ValueError) as error:
+        raise ModelError(
+            expected=f"the description of a detector in {path}",
+            found=str(error),
+            fix="see 'Detectors from elsewhere' in the documentation",
+        ) from error
+
+
+def _parsed(path: Path) -> dict[str, Any]:
+    content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    if not isinstance(content, dict):
+        raise ValueError("no `key: value` lines")
+    unknown = [str(key) for key in content if key not in _READERS]
+    if unknown:
+        raise ValueError(f"unknown {', '.join(unknown)} (known: {', '.join(_READERS)})")
+    missing = [key for key in ("family", "classes") if key not in content]
+    if missing:
+        raise ValueError(f"no {' and no '.join(missing)}")
+    return {key: _READERS[key](key, value) for key, value in content.items()}
+
+
+def _interface(said: dict[str, Any], graph_size_px: tuple[int, int] | None, path: Path) -> Interface:
+    family: Family = said.pop("family")
+    classes = said.pop("classes")
+    size_px = said.pop("input_size", graph_size_px)
+    if size_px is None:
+        raise ValueError("no input_size, which the graph leaves open; such as `input_size: 640x640`")
+    if graph_size_px is not None and size_px != graph_size_px:
+        raise ValueError(f"input_size {_times(size_px)}, but the graph takes {_times(graph_size_px)}")
+    return Interface(
+        family=family,
+        classes=_labels(path.parent / classes) if isinstance(classes, str) else classes,
+        input_size_px=size_px,
+        output_names=said.pop("outputs", {}),
+        preprocessing=replace(USUAL[family], **said),
+    )
+
+
+def _labels(path: Path) -> tuple[str, ...]:
+    lines = (line.strip() for line in path.read_text(encoding="utf-8").splitlines())
+    labels = tuple(line for line in lines if line)
+    if not labels:
+        raise ValueError(f"no label in {path.name}")
+    return labels
+
+
+def _times(size_px: tuple[int, int]) -> str:
+    return f"{size_px[0]}x{size_px[1]}"
+
+
+def _classes(key: str, value: object) -> str | tuple[str, ...]:
+    if isinstance(value, str):
+        return value
+    if not isinstance(value, list) or not value or any(isinstance(label, dict | list | None) for label in value):
+        raise ValueError(f"{key} that are neither a list of labels nor a file's name")
+    return tuple(str(label) for label in value)
+
+
+def _size(key: str, value: object) -> tuple[int, int]:
+    sides = re.fullmatch(r"([1-9]\d*)\s*x\s*([1-9]\d*)", str(value))
+    if sides is None:
+        raise ValueError(f"{key} {value}, which is not like 640x640")
+    return int(sides[1]), int(sides[2])
+
+
+def _one_of(*allowed: object) -> Callable[[str, object], object]:
+    def read(key: str, value: object) -> object:
+        if value not in allowed:
+            raise ValueError(f"{key} {value}, which is none of {', '.join(map(str, allowed))}")
+        return value
+
+    return read
+
+
+def _level(key: str, value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= 255:
+        raise ValueError(f"{key} {value}, which is not a level from 0 to 255")
+    return float(value)
+
+
+def _three(key: str, value: object) -> tuple[float, ...]:
+    if not isinstance(value, list) or len(value) != 3:
+        raise ValueError(f"{key} {value}, which are not three numbers")
+    return tuple(_level(key, part) for part in value)
+
+
+def _spread(key: str, value: object) -> tuple[float, ...]:
+    numbers = _three(key, value)
+    if min(numbers) <= 0:
+        raise ValueError(f"{key} {value}, which are not all above 0")
+    return numbers
+
+
+def _outputs(key: str, value: object) -> dict[str, str]:
+    if not isinstance(value, dict) or not value.keys() <= set(ROLES):
+        raise ValueError(f"{key} {value}, which do not give names to some of {', '.join(ROLES)}")
+    return {role: str(name) for role, name in value.items()}
+
+
+_READERS: Final[Mapping[str, Callable[[str, object], Any]]] = {
+    "family": _one_of(*get_args(Family)),
+    "classes": _classes,
+    "input_size": _size,
+    "colour": _one_of(*get_args(Colour)),
+    "white": _one_of(1, 255),
+    "mean": _three,
+    "std": _spread,
+    "placement": _one_of(*get_args(Placement)),
+    "pad": _level,
+    "outputs": _outputs,
+}

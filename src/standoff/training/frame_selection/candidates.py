@@ -1,0 +1,59 @@
+"""Look through a source for frames that could be chosen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from itertools import pairwise
+
+from standoff.core.protocols import Detector
+from standoff.core.types import Detections, Frame
+from standoff.training.frame_selection.appearance import describe, sharpness
+from standoff.training.frame_selection.doubt import doubt, flickering
+from standoff.training.frame_selection.selection import Candidate
+
+_CONSECUTIVE_S = 0.2
+"""Frames further apart show other things, not the same things found and lost."""
+_ROUNDING_S = 1e-6
+
+
+def look_through(frames: Iterable[Frame], detector: Detector, every_s: float, threshold: float) -> Iterator[Candidate]:
+    """Yield a candidate each `every_s` seconds; the frame right after it tells which of its boxes flicker.
+
+    Args:
+        frames: All frames of the source, in order.
+        detector: Its unsure boxes are needed, too.
+        every_s: Least time between two candidates; 0: every frame is one.
+        threshold: Score from which a box counts.
+    """
+    due_s = float("-inf")
+    seen: dict[int, Detections] = {}
+    for frame, following in _with_next(frames):
+        if frame.time_s < due_s - _ROUNDING_S:
+            continue
+        due_s = frame.time_s + every_s
+        now = seen.pop(frame.index) if frame.index in seen else detector.detect(frame)
+        flicker = 0
+        if following is not None and following.time_s - frame.time_s <= _CONSECUTIVE_S:
+            seen = {following.index: detector.detect(following)}
+            flicker = int(flickering(now, seen[following.index], threshold).sum())
+        yield Candidate(
+            index=frame.index,
+            time_s=frame.time_s,
+            detections=now,
+            doubt=float(doubt(now.score, threshold).sum()),
+            flicker=flicker,
+            sharpness=sharpness(frame.picture),
+            look=describe(frame.picture, now),
+        )
+
+
+def _with_next(frames: Iterable[Frame]) -> Iterator[tuple[Frame, Frame | None]]:
+    """Yield each frame with the one after it, and the last one with None."""
+
+    def ended() -> Iterator[Frame | None]:
+        yield from frames
+        yield None
+
+    for frame, following in pairwise(ended()):
+        if frame is not None:
+            yield frame, following

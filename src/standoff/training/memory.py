@@ -1,0 +1,62 @@
+"""Out of memory: say which batch would fit, instead of only that this one does not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+
+import torch
+
+from standoff.core.errors import ConfigError
+
+
+def is_out_of_memory(error: BaseException) -> bool:
+    """Tell whether an allocation failed: on a GPU, in torch's CPU allocator, or in Python itself.
+
+    >>> is_out_of_memory(MemoryError()), is_out_of_memory(RuntimeError("shapes do not fit"))
+    (True, False)
+    """
+    if isinstance(error, (MemoryError, torch.OutOfMemoryError)):
+        return True
+    return isinstance(error, RuntimeError) and "can't allocate memory" in str(error)
+
+
+@contextmanager
+def saying_what_fits(batch: int, attempt: Callable[[int], None]) -> Generator[None, None, None]:
+    """Turn a failed allocation into advice.
+
+    Args:
+        batch: Pictures at once that may be too many.
+        attempt: Goes through a step with so many pictures, or runs out of memory.
+
+    Raises:
+        ConfigError: Memory ran out; says the largest halving of the batch that fits.
+    """
+    try:
+        yield
+        return
+    except (MemoryError, RuntimeError) as error:
+        if not is_out_of_memory(error):
+            raise
+        cause = error
+    smaller = batch // 2
+    while smaller and not _fits(attempt, smaller):
+        smaller //= 2
+    fix = (
+        f"set batch to {smaller}, which fits, and accumulate to {-(-batch // smaller)} for the same step"
+        if smaller
+        else "take a smaller size_px or network: not even one picture fits"
+    )
+    raise ConfigError(expected=f"memory for {batch} pictures at once", found="too little", fix=fix) from cause
+
+
+def _fits(attempt: Callable[[int], None], pictures: int) -> bool:
+    if torch.cuda.is_available():
+        torch.cuda.empty_cache()
+    try:
+        attempt(pictures)
+    except (MemoryError, RuntimeError) as error:
+        if is_out_of_memory(error):
+            return False
+        raise
+    return True

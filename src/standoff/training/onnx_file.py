@@ -1,0 +1,45 @@
+"""Read and write the ONNX files of our own detectors."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import onnx
+
+from standoff.stages.detect.model_card import ModelCard, file_sha256
+from standoff.stages.detect.runtime import open_session
+
+_QUANTIZED = frozenset({"QuantizeLinear", "DequantizeLinear", "QLinearConv", "ConvInteger"})
+
+
+def read_own_model(path: Path) -> tuple[onnx.ModelProto, ModelCard]:
+    """Load a model that describes itself.
+
+    Raises:
+        ModelError: There is no such file, it is no ONNX model, or it has no card.
+    """
+    metadata = open_session(path, "cpu", 1).get_modelmeta().custom_metadata_map
+    return onnx.load(str(path)), ModelCard.from_metadata(metadata, path.name)
+
+
+def is_quantized(model: onnx.ModelProto) -> bool:
+    """Tell whether a model computes in integers already."""
+    return any(node.op_type in _QUANTIZED for node in model.graph.node)
+
+
+def describe_as_made_from(model: onnx.ModelProto, source: Path, **facts: object) -> None:
+    """Give a model the metadata of the file that it was made from, and name that file among its sources.
+
+    Args:
+        model: Changed in place.
+        source: A model of ours.
+        facts: More to say, by key, of plain values.
+    """
+    original, card = read_own_model(source)
+    texts = {entry.key: entry.value for entry in original.metadata_props}
+    texts |= replace(card, sources={**card.sources, source.name: file_sha256(source)}).to_metadata()
+    texts |= {key: json.dumps(value) for key, value in facts.items()}
+    del model.metadata_props[:]
+    onnx.helper.set_model_props(model, texts)
