@@ -86,16 +86,15 @@ def _print_score(score: ClipScore) -> None:
         "Distances", columns, measured, "MADE and MAPE: the paper's mean absolute error, in metres and percent."
     )
     met = [_encounter_row(one) for one in score.encounters]
+    recognised = sum(one.recognised for one in score.encounters)
     false = ", ".join(score.false_hazards) or "none"
-    columns = ("what really happened", "between", "seconds", "least gap", "what the monitor said")
-    print_table("Hazards", columns, met, f"False warnings and dangers: {false}.", texts=5)
+    caption = f"{recognised} of {len(met)} recognised. False warnings and dangers: {false}."
+    print_table("Hazards", ("really", "between", "seconds", "least gap", "said", "at"), met, caption, texts=2)
 
 
 def _encounter_row(one: Encounter) -> tuple[str, ...]:
-    said = f"{one.said} at {one.said_s:.1f} s" if one.said else "nothing"
-    verdict = "right" if one.recognised else f"should be {one.expected}"
-    seconds = f"{one.start_s:.1f} - {one.end_s:.1f}"
-    return one.kind, " - ".join(one.names), seconds, f"{one.least_gap_m:.2f} m", f"{said}: {verdict}"
+    said = (one.said, f"{one.said_s:.1f} s") if one.said else ("nothing", "")
+    return one.kind, ", ".join(one.names), f"{one.start_s:.1f}-{one.end_s:.1f}", f"{one.least_gap_m:.2f} m", *said
 
 
 def _number(value: float, unit: str, digits: int = 2) -> str:

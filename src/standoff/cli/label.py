@@ -61,8 +61,9 @@ def _tell(report: LabelReport, out: Path) -> None:
         (f"{choice.candidate.index}", f"{choice.candidate.time_s:.2f}", f"{choice.candidate.doubt:.1f}", choice.reason)
         for choice in report.choices
     ]
-    caption = f"{report.boxes} boxes proposed; open {out / 'contact_sheet.png'}"
+    caption = f"{report.boxes} boxes proposed"
     if not report.anything_seen:
-        caption = "The detector saw nothing in any frame; these were chosen for being unlike each other. " + caption
+        caption = "The detector saw nothing in any frame; these were chosen for being unlike each other."
     title = f"{len(report.choices)} of {report.looked_at} frames are worth labelling"
     print_table(title, ("frame", "s", "doubt", "why"), rows, caption, texts=0)
+    typer.echo(f"open {out / 'contact_sheet.png'}")

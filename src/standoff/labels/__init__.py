@@ -6,7 +6,21 @@
 """
 
 from standoff.labels.pictures import load_picture
+from standoff.labels.proposals import ProposedPicture, write_coco, write_label_studio
 from standoff.labels.read import read_data
+from standoff.labels.site_classes import to_site_classes
 from standoff.labels.types import SPLITS, LabelledData, LabelledPicture, Problem, Split
 
-__all__ = ["SPLITS", "LabelledData", "LabelledPicture", "Problem", "Split", "load_picture", "read_data"]
+__all__ = [
+    "SPLITS",
+    "LabelledData",
+    "LabelledPicture",
+    "Problem",
+    "ProposedPicture",
+    "Split",
+    "load_picture",
+    "read_data",
+    "to_site_classes",
+    "write_coco",
+    "write_label_studio",
+]

@@ -12,7 +12,7 @@ from pathlib import Path
 from standoff.core.errors import ModelError
 from standoff.stages.detect.model_card import INPUT_NAME, OUTPUT_NAME, ModelCard, file_sha256
 from standoff.training.darknet_cfg import DarknetCfg, read_cfg, read_text
-from standoff.training.darknet_shapes import largest_stride
+from standoff.training.darknet_shapes import check_input
 from standoff.training.required import require_packages
 from standoff.training.whole_file import whole_file
 
@@ -44,7 +44,7 @@ def export_darknet(
     network = read_cfg(cfg)
     if size_px is not None:
         network = replace(network, width_px=size_px[0], height_px=size_px[1])
-    _check_input(network)
+    check_input(network)
     card = ModelCard(
         classes=_read_names(names, network),
         anchors_px=tuple(head.anchors_px for head in network.heads),
@@ -58,24 +58,6 @@ def export_darknet(
 
             store_half(path, path)
     return card
-
-
-def _check_input(network: DarknetCfg) -> None:
-    if network.channels != 3:
-        raise ModelError(
-            expected=f"3 input channels, red, green and blue, in {network.name}",
-            found=f"{network.channels}",
-            fix="give a cfg for colour pictures",
-        )
-    stride = largest_stride(network)
-    size_px = network.width_px, network.height_px
-    if min(size_px) < stride or size_px[0] % stride or size_px[1] % stride:
-        width_px, height_px = (max(stride, round(side / stride) * stride) for side in size_px)
-        raise ModelError(
-            expected=f"an input width and height that are multiples of {stride} px",
-            found=f"{size_px[0]}x{size_px[1]}",
-            fix=f"take {width_px}x{height_px}",
-        )
 
 
 def _read_names(path: Path, network: DarknetCfg) -> tuple[str, ...]:

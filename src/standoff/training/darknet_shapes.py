@@ -131,3 +131,26 @@ def weights_numbers(cfg: DarknetCfg) -> int:
             kernels = layer.filters * layer.size**2 * channels // layer.groups
             total += kernels + layer.filters * (4 if layer.batch_normalized else 1)
     return total
+
+
+def check_input(network: DarknetCfg) -> None:
+    """Refuse networks that are not for colour pictures, and input sizes that their strides do not divide.
+
+    Raises:
+        ModelError: It is one.
+    """
+    if network.channels != 3:
+        raise ModelError(
+            expected=f"3 input channels, red, green and blue, in {network.name}",
+            found=f"{network.channels}",
+            fix="give a cfg for colour pictures",
+        )
+    stride = largest_stride(network)
+    size_px = network.width_px, network.height_px
+    if min(size_px) < stride or size_px[0] % stride or size_px[1] % stride:
+        width_px, height_px = (max(stride, round(side / stride) * stride) for side in size_px)
+        raise ModelError(
+            expected=f"an input width and height that are multiples of {stride} px",
+            found=f"{size_px[0]}x{size_px[1]}",
+            fix=f"take {width_px}x{height_px}",
+        )

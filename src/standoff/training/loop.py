@@ -12,7 +12,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from standoff.core.errors import ConfigError, DataError
+from standoff.core.errors import DataError
 from standoff.evaluation.detection import DetectionScore
 from standoff.labels import LabelledData, Problem
 from standoff.training.batches import Batch, open_batches
@@ -84,7 +84,6 @@ class Trainer:
 
     Raises:
         DataError: A split is empty.
-        ConfigError: The size does not fit the network.
     """
 
     def __init__(
@@ -99,7 +98,6 @@ class Trainer:
                 )
         self._crew = Crew.join()
         self._stride = largest_stride(network.cfg)
-        _check_size(params.size_px, self._stride)
         self._data, self._params, self._checkpoints = data, params, checkpoints
         self._backbone_layers = backbone_layers
         self._network = _on(self._crew.device, network)
@@ -170,12 +168,13 @@ class Trainer:
         frozen = max(params.frozen_layers, self._backbone_layers if is_frozen else 0)
         set_trainable(self._network, frozen, self._backbone_layers, frozen_norm=params.frozen_norm)
         set_learning_rate(self._optimizer, learning_rate(step, params))
-        # Dropout draws from here; seeded by the step, so that a resumed run draws the same.
-        torch.manual_seed(np.random.SeedSequence([params.seed, step]).generate_state(1)[0].item())
         self._optimizer.zero_grad(set_to_none=True)
         sums = np.zeros(len(_TERMS))
-        for _ in range(params.accumulate):
+        for part in range(params.accumulate):
             batch = next(stream).to(self._crew.device)
+            # Dropout draws from here: the same in a resumed run, whatever the loader drew for itself.
+            seed = np.random.SeedSequence([params.seed, step, part, self._crew.rank])
+            torch.manual_seed(seed.generate_state(1)[0].item())
             for problem in batch.problems:
                 watcher.on_bad_picture(problem)
             with saying_what_fits(params.batch, self._try):
@@ -265,15 +264,6 @@ class Trainer:
             "progress": {name: getattr(self.progress, name) for name in Progress.__slots__},
         }
         save_checkpoint(self._checkpoints, self.progress.step, state)
-
-
-def _check_size(size_px: tuple[int, int], stride: int) -> None:
-    if size_px[0] % stride or size_px[1] % stride:
-        raise ConfigError(
-            expected=f"size_px in multiples of {stride}, the network's largest stride",
-            found=f"{size_px[0]}x{size_px[1]}",
-            fix=f"take {round(size_px[0] / stride) * stride}x{round(size_px[1] / stride) * stride}",
-        )
 
 
 def _on(device: torch.device, network: DarknetNetwork) -> DarknetNetwork:

@@ -16,6 +16,7 @@ from standoff.stages.detect.model_card import file_sha256
 from standoff.stages.sinks.json_text import plain
 from standoff.training.darknet_cfg import parse_cfg, read_cfg
 from standoff.training.darknet_network import DarknetNetwork
+from standoff.training.darknet_shapes import check_input
 from standoff.training.half_precision import store_half
 from standoff.training.loop import Progress, Trainer, Watcher
 from standoff.training.params import TrainParams
@@ -113,6 +114,7 @@ def train_detector(plan: RunPlan, out: Path, listener: Listener, *, resumes: boo
 def _started(plan: RunPlan, data: LabelledData, folder: RunFolder, listener: Listener) -> tuple[DarknetNetwork, int]:
     cfg_text = compose_cfg(plan.arch, data, plan.params)
     cfg = parse_cfg(cfg_text, "network.cfg")
+    check_input(cfg)
     network, transferred = fill_network(cfg, data.classes, plan.weights, plan.params.seed)
     layers = len(transferred.copied), len(transferred.resized), len(transferred.fresh)
     listener.on_message(

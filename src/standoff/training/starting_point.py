@@ -18,15 +18,13 @@ from standoff.training.batches import open_batches
 from standoff.training.darknet_cfg import DarknetCfg, parse_cfg, read_text
 from standoff.training.darknet_network import DarknetNetwork
 from standoff.training.darknet_shapes import layer_strides
-from standoff.training.efficientnet_weights import fill_efficientnet_lite0
 from standoff.training.initial_weights import initialize_layers
 from standoff.training.params import TrainParams
 from standoff.training.transfer import Transferred, transfer_weights
 
 _ANCHORS_A_HEAD = 3
-_ANCHOR_SAMPLES = 512
+_ANCHOR_SAMPLES = 256
 """Augmented pictures whose boxes are clustered: some thousands of boxes."""
-_TORCH_WEIGHTS = (".pth", ".pt")
 
 
 def backbone_of(network: DarknetNetwork, transferred: Transferred) -> int:
@@ -110,8 +108,4 @@ def fill_network(
     if weights is None:
         initialize_layers(network, layers, generator)
         return network, Transferred("nothing", (), (), layers)
-    if weights.suffix in _TORCH_WEIGHTS:
-        initialize_layers(network, layers, generator)
-        filled = fill_efficientnet_lite0(network, weights)
-        return network, Transferred(weights.name, layers[:filled], (), layers[filled:])
     return network, transfer_weights(network, weights, classes=classes, generator=generator)

@@ -40,18 +40,19 @@ def test_a_list_carries_labels_scale_and_ignored_places(tmp_path: Path) -> None:
     # a car of 46 x 20 px in the middle, a cyclist of 10 x 6 px at the left
     (tmp_path / "labels" / "f-1.txt").write_text("0 0.5 0.5 0.46 0.3333333\n4 0.05 0.5 0.1 0.1\n")
     entry = {"pictures": "images/*.jpg", "labels": {0: "vehicle", 4: "ignore"}, "ignore_px": [[0, 0, 5, 5]]}
-    (tmp_path / "list.yaml").write_text(yaml.safe_dump([{**entry, "light": ["overcast"], "shadow_deg": 30}]))
+    (tmp_path / "list.yaml").write_text(yaml.safe_dump([entry | {"light": ["overcast"], "shadow_deg": 30}]))
     (found,) = find_backgrounds([str(tmp_path / "list.yaml")])
     assert (found.group, found.conditions, found.shadow_deg, found.class_id.tolist()) == ("f", ("overcast",), 30, [5])
     assert found.px_per_m == pytest.approx(10.0)
     np.testing.assert_allclose(found.xyxy_px, [[26.5, 19.5, 72.5, 39.5]], atol=1e-4)
-    np.testing.assert_allclose(found.ignored_px, [[0, 0, 5, 5], [-0.5, 26.5, 9.5, 32.5]], atol=1e-4)
+    np.testing.assert_allclose(found.ignored_px, [[0.0, 0.0, 5.0, 5.0], [-0.5, 26.5, 9.5, 32.5]], atol=1e-4)
 
 
 @pytest.mark.parametrize(
     "content",
     ["{a: 1}", "- {view: nadir}", "- {pictures: '*.jpg', colour: red}", "- {pictures: '*.jpg', view: sideways}",
-     "- {pictures: '*.jpg', light: [moon]}", "- {pictures: '*.jpg', labels: {0: vehicle}}", "- [", "- {pictures: '*.gif'}"],
+     "- {pictures: '*.jpg', light: [moon]}", "- {pictures: '*.jpg', labels: {0: vehicle}}", "- [",
+     "- {pictures: '*.gif'}"],
 )  # fmt: skip
 def test_a_list_that_is_wrong_is_refused(tmp_path: Path, content: str) -> None:
     _photograph(tmp_path / "p.jpg")

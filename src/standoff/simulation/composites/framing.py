@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
+import shapely
 
 from standoff.core.camera import Camera
 from standoff.core.errors import DataError
@@ -66,8 +67,9 @@ class Framed:
 
 
 def frame(rng: np.random.Generator, background: Background, size_px: tuple[int, int]) -> Framed:
-    """Look at a photograph's ground from somewhere; people shall be 10 to 100 px tall, any octave equally often, as far as the photograph
-    is fine and wide enough for it.
+    """Look at a photograph's ground from somewhere.
+
+    People shall be 10 to 100 px tall, any octave equally often, as far as the photograph is fine and wide enough.
 
     Raises:
         DataError: The file is not a picture.
@@ -190,22 +192,16 @@ def _look_down(
 def _look_closer(
     rng: np.random.Generator, photographed: View, size_px: tuple[int, int], person_px: float
 ) -> tuple[View, float]:
-    """Turn and zoom in from where an oblique photograph was taken: what stands on the ground stays upright."""
-    centre_px = rng.uniform(0.1, 0.9, 2) * [photographed.camera.width_px, photographed.camera.height_px]
-    east, north, up = photographed.rays(centre_px[None])[0].tolist()
-    pitch_deg = float(np.rad2deg(np.arctan2(-up, np.hypot(east, north))))
-    away_m = photographed.position_m[2] / max(np.sin(np.deg2rad(pitch_deg)), 0.05)
-    focal_px = float(person_px / _person_m(pitch_deg) * away_m)
-    zoom = focal_px / float(photographed.camera.matrix[0, 0])
-    heading_deg, roll_deg = float(np.rad2deg(np.arctan2(east, north))), float(rng.normal(0.0, 0.5))
-    view = View.aimed(
-        _pinhole(*size_px, focal_px),
-        photographed.position_m,
-        heading_deg=heading_deg,
-        pitch_deg=pitch_deg,
-        roll_deg=roll_deg,
-    )
-    return view, zoom
+    """Take a piece of an oblique photograph: what stands on the ground stays upright."""
+    lens = photographed.camera
+    centre_px = rng.uniform(0.1, 0.9, 2) * [lens.width_px, lens.height_px]
+    down = max(-float(photographed.rays(centre_px[None])[0, 2]), 0.05)
+    focal_px = person_px / _person_m(float(np.rad2deg(np.arcsin(down)))) * float(photographed.position_m[2]) / down
+    zoom = focal_px / float(lens.matrix[0, 0])
+    camera = _pinhole(*size_px, focal_px)
+    matrix = camera.matrix.copy()
+    matrix[:2, 2] -= zoom * (centre_px - lens.matrix[:2, 2])
+    return replace(photographed, camera=replace(camera, matrix=matrix)), zoom
 
 
 def _person_m(pitch_deg: float) -> float:
@@ -263,11 +259,9 @@ def _carried(xyxy_px: FloatArray, onto: FloatArray, size_px: tuple[int, int]) ->
         return np.empty((0, 4)), np.empty(0, dtype=bool)
     corners, _ = apply(onto, xyxy_px[:, [0, 1, 2, 1, 2, 3, 0, 3]].reshape(-1, 2))
     corners = corners.reshape(-1, 4, 2)
-    low, high = corners.min(axis=1), corners.max(axis=1)
-    size = np.array(size_px, dtype=np.float64)
-    cut_low, cut_high = np.clip(low, -0.5, size - 0.5), np.clip(high, -0.5, size - 0.5)
-    share = np.prod(cut_high - cut_low, axis=1) / np.maximum(np.prod(high - low, axis=1), 1e-9)
-    cut: FloatArray = np.hstack([cut_low, cut_high])
-    cut[~(share > 0.0)] = np.nan
-    inside: BoolArray = share >= _INSIDE
+    cut, inside = np.full((len(corners), 4), np.nan), np.zeros(len(corners), dtype=bool)
+    ahead = ~np.isnan(corners).any(axis=(1, 2))
+    outlines = shapely.polygons(corners[ahead])
+    seen = shapely.intersection(outlines, shapely.box(-0.5, -0.5, size_px[0] - 0.5, size_px[1] - 0.5))
+    cut[ahead], inside[ahead] = shapely.bounds(seen), shapely.area(seen) >= _INSIDE * shapely.area(outlines)
     return cut, inside

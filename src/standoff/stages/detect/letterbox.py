@@ -93,13 +93,13 @@ class Letterbox:
         Returns:
             (1, 3, height, width).
         """
-        colours_first = cv2.dnn.blobFromImage(resized, wanted.white / 255.0, swapRB=wanted.colour == "rgb")
-        filled = np.asarray(colours_first, dtype=np.float32)
-        if self.inner_size_px != self.input_size_px:
-            (width, height), (left, top) = self.inner_size_px, self.offset_px
-            shape = (1, 3, self.input_size_px[1], self.input_size_px[0])
-            filled = np.full(shape, wanted.pad / 255.0 * wanted.white, np.float32)
-            filled[:, :, top : top + height, left : left + width] = colours_first
+        (width, height), (left, top) = self.inner_size_px, self.offset_px
+        shape = (1, 3, self.input_size_px[1], self.input_size_px[0])
+        filled = np.full(shape, wanted.pad / 255.0 * wanted.white, np.float32)
+        channels = cv2.split(resized) if wanted.colour == "bgr" else cv2.split(resized)[::-1]
+        for plane, channel in zip(filled[0], channels, strict=True):
+            inside = plane[top : top + height, left : left + width]
+            np.multiply(channel, np.float32(wanted.white / 255.0), out=inside, dtype=np.float32)
         if wanted.normalises:
             mean, std = (np.array(values, np.float32).reshape(3, 1, 1) for values in (wanted.mean, wanted.std))
             filled = (filled - mean) / std

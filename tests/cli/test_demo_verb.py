@@ -1,0 +1,78 @@
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+from cli.calling import Call
+from evaluation.paper import drawn_clip
+
+from standoff.core.errors import ModelError
+from standoff.evaluation.paper import Clip, load_clip
+from standoff.evaluation.paper.truth_detector import TrueBoxes
+from standoff.stages.detect import find_model
+
+
+@pytest.fixture(scope="module")
+def drawn_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return drawn_clip.write_clip(tmp_path_factory.mktemp("clips") / "drawn")
+
+
+@pytest.fixture
+def drawn(drawn_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Clip:
+    """A quick film in place of the shipped one, and a detector that knows it."""
+    clip = load_clip(shutil.copytree(drawn_folder, tmp_path / "standoff" / "demo"))
+    monkeypatch.setattr("standoff.cli.demo.files", lambda package: tmp_path / package)
+    monkeypatch.setattr("standoff.config.build.find_model", lambda model: model)
+    monkeypatch.setattr("standoff.config.build.OnnxDetector", lambda path, params: TrueBoxes(clip))
+    return clip
+
+
+def test_the_demo_writes_all_outputs_and_prints_how_far_off_it_is(drawn: Clip, tmp_path: Path, call: Call) -> None:
+    out = tmp_path / "out"
+    code, said, _ = call("demo", "--out", out, "--json", tmp_path / "found.json")
+    assert code == 0
+    made = {path.name for path in out.iterdir()}
+    assert made >= {"report.html", "annotated.mp4", "run.json", "tracks.parquet", "proximity.parquet", "hazards.jsonl"}
+    for words in ("complete", "recall", "MADE", " of 2 recognised", "False warnings", "report.html", "annotated.mp4"):
+        assert words in said
+    found = json.loads((tmp_path / "found.json").read_text())
+    assert found["frames"] == drawn.frame_count
+    assert {one["kind"] for one in found["encounters"]} == {"breach"}
+
+
+def test_machines_get_only_json(drawn: Clip, tmp_path: Path, call: Call) -> None:
+    code, said, _ = call("demo", "--out", tmp_path / "out", "--json", "-")
+    assert code == 0
+    assert json.loads(said)["frames"] == drawn.frame_count
+
+
+def test_an_earlier_run_is_kept_unless_it_may_be_replaced(drawn: Clip, tmp_path: Path, call: Call) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "run.json").write_text("{}")
+    code, _, error = call("demo", "--out", out)
+    assert (code, error.count("\n")) == (2, 1)
+    assert "run.json" in error and "--overwrite" in error
+    assert call("demo", "--out", out, "--overwrite")[0] == 0
+
+
+@pytest.mark.parametrize("lost", ["video.mp4", "truth.parquet", "reference.yaml"])
+def test_a_broken_installation_is_one_line(drawn: Clip, tmp_path: Path, call: Call, lost: str) -> None:
+    (drawn.folder / lost).unlink()
+    code, _, error = call("demo", "--out", tmp_path / "out")
+    assert (code, error.count("\n")) == (2, 1)
+    assert lost in error and "nstall standoff again" in error
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_shipped_detector_sees_the_breach_and_the_near_miss(tmp_path: Path, call: Call) -> None:
+    try:
+        find_model("site")
+    except ModelError as absent:
+        pytest.skip(str(absent))
+    assert call("demo", "--out", tmp_path / "out", "--json", tmp_path / "found.json")[0] == 0
+    found = json.loads((tmp_path / "found.json").read_text())
+    assert all(one["recognised"] for one in found["encounters"])
+    assert found["false_hazards"] == []
