@@ -18,7 +18,7 @@ PUBLIC_NAMES = {
     "standoff.stages.locate": {"LocateParams", "Locator"},
     "standoff.stages.proximity": {"ProximityMeter", "ProximityParams", "side_classes"},
     "standoff.stages.hazard": {"HazardMonitor", "HazardParams"},
-    "standoff.simulation.render": {"Look", "Rendered", "Renderer"},
+    "standoff.simulation.render": {"Cutout", "Look", "Rendered", "Renderer"},
     "standoff.simulation.behaviour": {
         "carrying_between", "crossing_behind", "digging", "dozing", "driving_through", "grading", "idle",
         "keep_distance", "loader_loading", "near_miss", "pair_talking", "random_stance", "rolling", "spreading",

@@ -53,7 +53,6 @@ _CHOICES = 5
 _INSET = 0.02
 _ROOM_M = 0.25
 _TOOL_M = 0.7
-_LARGEST_PX = 110.0
 _MESH_SHARE = 1 / 3
 
 
@@ -126,6 +125,11 @@ class _Floor:
         x_m, y_m = (xy_m + away_m * toward / max(float(np.linalg.norm(toward)), 1e-6)).tolist()
         return Place(x_m, y_m, float(self._rng.uniform(0.0, 2 * np.pi)))
 
+    def shows(self, place: Place) -> bool:
+        """Return whether a place is in the picture."""
+        at_px = self.view.project(np.array([[place.x_m, place.y_m, 0.0]]))[0]
+        return bool(((at_px > 0.0) & (at_px < self._size)).all())
+
     def take(self, area: shapely.Geometry, room_m: float = _ROOM_M) -> bool:
         """Take an area if it is free; return whether it was."""
         if self._taken and shapely.dwithin(area, np.array(self._taken, dtype=object), room_m).any():
@@ -196,6 +200,8 @@ def _add_people(rng: np.random.Generator, floor: _Floor, company: Company, groun
                 place = floor.near(machines[int(rng.integers(len(machines)))], 1.5, 8.0)
             else:
                 place = floor.somewhere()
+            if not floor.shows(place):
+                continue
             motion = _person_motion(rng, worker, place)
             if floor.take(_outline(worker, motion), 0.0):
                 company.actors.append(Actor(len(company.actors) + 1, worker, motion))
