@@ -12,10 +12,10 @@ import numpy as np
 import torch
 
 from standoff.core.types import ImageArray
-from standoff.training.darknet_cfg import parse_cfg
-from standoff.training.darknet_export import export_darknet
-from standoff.training.darknet_network import DarknetNetwork
-from standoff.training.darknet_weights import save_weights
+from standoff.training.darknet.cfg import parse_cfg
+from standoff.training.darknet.export import export_darknet
+from standoff.training.darknet.network import DarknetNetwork
+from standoff.training.darknet.weights import save_weights
 
 CELL_PX = 16
 SIZE_PX = (128, 96)

@@ -7,7 +7,7 @@ import pytest
 import shapely
 from tolerances import GEOMETRY_REL
 
-from standoff.core.classes import CLASS_BY_NAME
+from standoff.core.classes import CLASS_BY_NAME, CLASSES
 from standoff.simulation.behaviour import idle
 from standoff.simulation.casting import CASTS, Cast, Stage, crowd, is_person, swept
 from standoff.simulation.motion import Place, sample
@@ -111,3 +111,21 @@ def test_the_stationary_cast_keeps_its_distance(distance_m: int, seed: int) -> N
 def test_a_stage_turns_with_the_camera() -> None:
     east = Stage(90.0, 1.0, 1.0, None, None).place(2.0, 5.0)
     np.testing.assert_allclose(east.xy_m, [5.0, -2.0], atol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_demo_has_one_near_miss_and_one_breach_whatever_the_seed(seed: int) -> None:
+    actors = _cast("demo", seed, Stage(60.0 * seed, 1.0, 14.0, None, None)).actors
+    workers = [actor for actor in actors if is_person(actor.model)]
+    gaps_m = []
+    for worker in workers:
+        for machine in (actor for actor in actors if not is_person(actor.model)):
+            reach_m = sum(CLASSES[actor.model.class_id].action_radius_m for actor in (worker, machine))
+            apart_m = [
+                np.linalg.norm(sample(worker.motion, t).xy_m - sample(machine.motion, t).xy_m)
+                for t in np.arange(0.0, 10.0, 0.04).tolist()
+            ]
+            gaps_m.append(float(min(apart_m)) - reach_m)
+    breach_m, near_miss_m, *others_m = sorted(gaps_m)
+    assert (breach_m, near_miss_m) == pytest.approx((-2.2, 0.6), abs=0.01)
+    assert len(others_m) == 4 and min(others_m) > 2.0

@@ -9,9 +9,9 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-from standoff.training.darknet_cfg import parse_cfg
-from standoff.training.darknet_network import DarknetNetwork
-from standoff.training.darknet_weights import save_weights
+from standoff.training.darknet.cfg import parse_cfg
+from standoff.training.darknet.network import DarknetNetwork
+from standoff.training.darknet.weights import save_weights
 
 _RAW_SPREAD = 0.4
 """Of trained heads: most boxes are within a factor of two of their anchors."""

@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 import yaml
 
-from standoff.training.augment import AugmentParams
-from standoff.training.params import TrainParams
+from standoff.training.pictures.augment import AugmentParams
+from standoff.training.run.params import TrainParams
 
 CLASSES = ("worker", "vehicle")
 _COLOURS_BGR = ((40, 200, 250), (200, 60, 30))

@@ -27,7 +27,7 @@ def paper(
         "paper"
     ),
     detector: Annotated[
-        str, typer.Option(help="truth (the true boxes), noisy (the same with errors), or a model, ONNX.")
+        str, typer.Option(help="truth (the true boxes), noisy (the same with errors), or a model: site, ONNX.")
     ] = "truth",
     anchor: Annotated[
         Anchor | None,
@@ -83,11 +83,14 @@ def _detector(text: str) -> Boxes | Path:
         return "truth"
     if text == "noisy":
         return "noisy"
-    if not Path(text).is_file():
+    from standoff.stages.detect import find_model
+
+    path = find_model(text)
+    if not path.is_file():
         raise ConfigError(
             expected="--detector truth, noisy, or a model file", found=repr(text), fix="check the word or the path"
         )
-    return Path(text)
+    return path
 
 
 def _box_error(detector: str, text: str | None) -> BoxError:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 if TYPE_CHECKING:
-    from standoff.training.quantization import QuantizationReport
+    from standoff.training.quantization.quantize import QuantizationReport
 
 
 def quantize(
@@ -32,7 +32,7 @@ def quantize(
     from standoff.training.required import require_packages
 
     require_packages("onnx", purpose="quantise a model")
-    from standoff.training.quantization import QuantizationPlan, QuantizationRefused, quantize_model
+    from standoff.training.quantization.quantize import QuantizationPlan, QuantizationRefused, quantize_model
 
     plan = QuantizationPlan(split=split, calibration_pictures=calibration, method=method)
     show = partial(progress, quiet=quiet or as_json, unit="steps")

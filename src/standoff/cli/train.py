@@ -11,7 +11,7 @@ import yaml
 from standoff.core.errors import ConfigError
 
 if TYPE_CHECKING:
-    from standoff.training.run import RunPlan
+    from standoff.training.run.train import RunPlan
 
 _PLAN_KEYS = ("data", "arch", "weights", "train")
 
@@ -46,7 +46,7 @@ def train(
 
     require_packages("torch", "onnx", purpose="train a detector")
     from standoff.cli.console import progress_bar
-    from standoff.training.run import Listener, read_run, train_detector
+    from standoff.training.run.train import Listener, read_run, train_detector
 
     given = {} if config is None else _read_plan(config)
     if resume:
@@ -107,8 +107,8 @@ def _override(given: dict[str, Any], named: dict[str, Any], settings: list[str])
 
 def _make_plan(given: dict[str, Any], origin: str) -> RunPlan:
     from standoff.config import read_params
-    from standoff.training.params import TrainParams
-    from standoff.training.run import RunPlan
+    from standoff.training.run.params import TrainParams
+    from standoff.training.run.train import RunPlan
 
     if given.get("data") is None:
         raise ConfigError(

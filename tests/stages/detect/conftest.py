@@ -8,9 +8,9 @@ import pytest
 import torch
 
 from standoff.training import export_darknet
-from standoff.training.darknet_cfg import parse_cfg
-from standoff.training.darknet_network import DarknetNetwork
-from standoff.training.darknet_weights import save_weights
+from standoff.training.darknet.cfg import parse_cfg
+from standoff.training.darknet.network import DarknetNetwork
+from standoff.training.darknet.weights import save_weights
 
 MakeModel = Callable[[tuple[str, ...], tuple[int, int]], Path]
 

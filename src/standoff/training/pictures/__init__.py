@@ -1,0 +1,1 @@
+"""What training shows: labelled pictures, seen as another drone might have, in batches."""

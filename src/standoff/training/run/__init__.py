@@ -1,0 +1,1 @@
+"""A training run: loss, steps, validations, checkpoints, and the folder that it leaves."""

@@ -1,0 +1,61 @@
+"""The model card that a run writes: what it learnt from, how well it does, and what that says nothing about."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import yaml
+
+from standoff.labels import SPLITS, LabelledData, Split
+from standoff.stages.sinks.json_text import plain
+from standoff.training.run.loop import Progress
+from standoff.training.run.tables import markdown_table
+
+
+def card_text(configuration: dict[str, Any], data: LabelledData, progress: Progress) -> str:
+    """Return the card as Markdown.
+
+    Args:
+        configuration: What repeats the run.
+        data: What it was trained on.
+        progress: How it went.
+    """
+    counts = "\n".join(_count(data, split) for split in SPLITS)
+    return f"""# Detector trained with standoff
+
+Classes: {", ".join(data.classes)}.
+
+## Data
+
+| split | pictures | groups | {" | ".join(data.classes)} |
+|---|---|---|{"---|" * len(data.classes)}
+{counts}
+
+Groups (scenes, flights, videos) are never in two splits.
+
+## Accuracy on the validation split, by step
+
+11-point AP at IoU 0.5, per cent (Kim et al., Eq. 1 and 2). The weights kept are those of step {progress.best_step}.
+They were chosen on this split, so that its figures are a little too good: measure on others with
+`standoff evaluate detection`.
+
+{markdown_table(progress.rows, data.classes)}
+## What these figures do not say
+
+How the detector does on sites, seasons, machines and cameras that the data does not show.
+
+## To repeat the run
+
+```yaml
+{yaml.safe_dump(plain(configuration), sort_keys=False)}```
+"""
+
+
+def _count(data: LabelledData, split: Split) -> str:
+    pictures = data.splits[split]
+    groups = {(picture.source, picture.group) for picture in pictures}
+    marked = [
+        str(sum(int((picture.class_id[~picture.ignored] == index).sum()) for picture in pictures))
+        for index in range(len(data.classes))
+    ]
+    return f"| {split} | {len(pictures)} | {len(groups)} | " + " | ".join(marked) + " |"

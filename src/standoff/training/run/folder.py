@@ -1,0 +1,179 @@
+"""The folder of a training run: everything that it takes to judge it, to use it, to go on with it or to repeat it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import yaml
+
+from standoff import __version__
+from standoff.core.errors import ConfigError, OutputError
+from standoff.evaluation.detection import DetectionScore
+from standoff.labels import LabelledPicture
+from standoff.labels.documents import read_json
+from standoff.stages.sinks.folder import partial_path
+from standoff.stages.sinks.json_text import plain, write_json
+from standoff.training.darknet.export import export_darknet
+from standoff.training.darknet.network import DarknetNetwork
+from standoff.training.darknet.weights import WeightsHeader, save_weights
+from standoff.training.run.figures import draw_curves, draw_predictions
+from standoff.training.run.loop import Progress
+from standoff.training.run.tables import markdown_table
+from standoff.training.run.validation import detect_pictures
+
+CHECKPOINTS: Final = "checkpoints"
+_SHOWN_PICTURES: Final = 6
+
+
+@dataclass(frozen=True, slots=True)
+class RunFolder:
+    """Paths and writers of one run.
+
+    Attributes:
+        path: The folder.
+        classes: Names.
+    """
+
+    path: Path
+    classes: tuple[str, ...]
+
+    @property
+    def checkpoints(self) -> Path:
+        """Folder of checkpoints."""
+        return self.path / CHECKPOINTS
+
+    @property
+    def cfg(self) -> Path:
+        """The network."""
+        return self.path / "network.cfg"
+
+    @property
+    def best_weights(self) -> Path:
+        """Averaged weights of the best validation so far."""
+        return self.path / "best.weights"
+
+    @property
+    def last_weights(self) -> Path:
+        """Averaged weights of the last validation."""
+        return self.path / "last.weights"
+
+    def write_start(self, cfg_text: str, configuration: dict[str, Any], facts: dict[str, Any]) -> None:
+        """Write what the run is before it begins.
+
+        Args:
+            cfg_text: Of the network.
+            configuration: What repeats the run: written as `run.yaml`.
+            facts: About the data and the starting point, for people and records.
+
+        Raises:
+            OutputError: The folder cannot be written.
+        """
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+            self._write("network.cfg", cfg_text)
+            self._write("classes.names", "\n".join(self.classes) + "\n")
+            self._write("run.yaml", yaml.safe_dump(plain(configuration), sort_keys=False))
+            write_json(self.path / "start.json", {"standoff": __version__, **facts})
+        except OSError as error:
+            raise OutputError(
+                expected=f"to write to {self.path}", found=str(error.strerror), fix="choose a folder that is writable"
+            ) from error
+
+    def read_start(self) -> dict[str, Any]:
+        """Read the facts again.
+
+        Raises:
+            DataError: They are not there.
+        """
+        return read_json(self.path / "start.json")
+
+    def write_validation(
+        self,
+        progress: Progress,
+        score: DetectionScore,
+        network: DarknetNetwork,
+        pictures: Sequence[LabelledPicture],
+        pictures_seen: int,
+    ) -> None:
+        """Write weights, table and curves after a validation; for the best one also predictions and scores.
+
+        Args:
+            progress: Its last row is this validation.
+            score: Its figures.
+            network: The averaged network.
+            pictures: Of the validation split; some are shown.
+            pictures_seen: In training so far; goes into the weights' header.
+        """
+        header = WeightsHeader(seen=pictures_seen)
+        save_weights(network, self.last_weights, header)
+        write_json(self.path / "history.json", progress.rows)
+        self._write("table.md", markdown_table(progress.rows, self.classes))
+        self._write_figure("curves.png", lambda path: draw_curves(progress.rows, self.classes, path))
+        if progress.best_step == progress.step:
+            save_weights(network, self.best_weights, header)
+            write_json(self.path / "best.json", {"step": progress.step, **score.to_dict()})
+            shown = pictures[:: max(1, len(pictures) // _SHOWN_PICTURES)][:_SHOWN_PICTURES]
+            readable, found = detect_pictures(network, shown, bf16=False)
+            self._write_figure("predictions.jpg", lambda path: draw_predictions(readable, found, self.classes, path))
+
+    def write_model(self, half: Callable[[Path, Path], None]) -> Path:
+        """Export the best weights as ONNX, in single and in half precision storage.
+
+        Args:
+            half: Stores a model's weights in half precision.
+
+        Returns:
+            The single precision file.
+        """
+        model = self.path / "model.onnx"
+        export_darknet(self.cfg, self.best_weights, self.path / "classes.names", None, model)
+        half(model, self.path / "model-half.onnx")
+        return model
+
+    def write_card(self, text: str) -> None:
+        """Write the model card."""
+        self._write("model-card.md", text)
+
+    def _write(self, name: str, text: str) -> None:
+        partial = partial_path(self.path / name)
+        partial.write_text(text, encoding="utf-8")
+        partial.replace(self.path / name)
+
+    def _write_figure(self, name: str, draw: Callable[[Path], None]) -> None:
+        partial = partial_path(self.path / name)
+        draw(partial)
+        partial.replace(self.path / name)
+
+
+def read_run(folder: Path) -> dict[str, Any]:
+    """Read what a run was started with.
+
+    Raises:
+        ConfigError: There is no run in the folder.
+    """
+    path = folder / "run.yaml"
+    if not path.is_file():
+        raise ConfigError(
+            expected=f"a training run to go on with in {folder}", found="no run.yaml", fix="start it without --resume"
+        )
+    loaded = yaml.safe_load(path.read_text(encoding="utf-8"))
+    if not isinstance(loaded, dict):
+        raise ConfigError(expected=f"settings in {path}", found="none", fix="start the run anew without --resume")
+    return loaded
+
+
+def refuse_used(folder: Path) -> None:
+    """Refuse a folder that holds something.
+
+    Raises:
+        OutputError: It does.
+    """
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise OutputError(
+            expected="a new or empty output folder",
+            found=f"files in {folder}",
+            fix="choose another one, or pass --resume to go on with the run in it",
+        )

@@ -1,0 +1,154 @@
+"""A training run from data to model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from time import monotonic
+from typing import Any
+
+from standoff.core.errors import ConfigError
+from standoff.evaluation.detection import DetectionScore
+from standoff.labels import LabelledData, Problem, read_data
+from standoff.labels.summary import summarise
+from standoff.stages.detect.model_card import file_sha256
+from standoff.stages.sinks.json_text import plain
+from standoff.training.darknet.cfg import parse_cfg, read_cfg
+from standoff.training.darknet.network import DarknetNetwork
+from standoff.training.darknet.shapes import check_input
+from standoff.training.quantization.half_precision import store_half
+from standoff.training.run.card import card_text
+from standoff.training.run.folder import RunFolder, read_run, refuse_used
+from standoff.training.run.loop import Progress, Trainer, Watcher
+from standoff.training.run.params import TrainParams
+from standoff.training.start.starting_point import backbone_of, compose_cfg, fill_network
+
+
+@dataclass(frozen=True, slots=True)
+class RunPlan:
+    """What to train, from what, on what.
+
+    Attributes:
+        data: Labelled pictures; see `standoff.labels.read_data`.
+        arch: Name of an architecture, or a Darknet cfg file.
+        weights: To start from; None is from scratch.
+        params: Settings.
+    """
+
+    data: Path
+    arch: str
+    weights: Path | None
+    params: TrainParams
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what repeats the run: plain values, as `run.yaml` holds them."""
+        weights = None if self.weights is None else str(self.weights)
+        return {"data": str(self.data), "arch": self.arch, "weights": weights, "train": plain(asdict(self.params))}
+
+
+@dataclass(frozen=True, slots=True)
+class Listener:
+    """Who hears of a run.
+
+    Attributes:
+        on_message: What people should know, line by line.
+        on_step: After each step: its number, its loss, and steps a second since the start.
+        on_row: After each validation, its row of the history.
+    """
+
+    on_message: Callable[[str], None]
+    on_step: Callable[[int, float, float], None]
+    on_row: Callable[[dict[str, Any]], None]
+
+
+def train_detector(plan: RunPlan, out: Path, listener: Listener, *, resumes: bool = False) -> Progress:
+    """Train a detector.
+
+    Args:
+        plan: What to do. A run that is resumed must have been started with the same.
+        out: Folder of the run.
+        listener: Hears of it.
+        resumes: Go on with the run in the folder.
+
+    Returns:
+        How it went; the best weights and their ONNX file are in the folder.
+
+    Raises:
+        DataError, ConfigError, ModelError, OutputError: See the parts.
+    """
+    if not resumes:
+        refuse_used(out)
+    data = read_data(plan.data)
+    _report_problems(data, listener)
+    folder = RunFolder(out, data.classes)
+    network, backbone_layers = _resumed(folder) if resumes else _started(plan, data, folder, listener)
+    trainer = Trainer(network, data, plan.params, folder.checkpoints, plan.params.backbone_layers or backbone_layers)
+    if resumes:
+        for name in trainer.resume():
+            listener.on_message(f"{name} is damaged and was passed over: going on from step {trainer.progress.step}")
+    unreadable: set[Path] = set()
+
+    def on_bad_picture(problem: Problem) -> None:
+        if problem.path not in unreadable:
+            unreadable.add(problem.path)
+            listener.on_message(f"skipped {problem.path}: {problem.found}")
+
+    def on_validation(progress: Progress, score: DetectionScore, shown: DarknetNetwork) -> None:
+        seen = progress.step * plan.params.batch * plan.params.accumulate
+        folder.write_validation(progress, score, shown, data.splits["val"], seen)
+        listener.on_row(progress.rows[-1])
+
+    first, started_s = trainer.progress.step, monotonic()
+
+    def on_step(step: int, loss: float) -> None:
+        listener.on_step(step, loss, (step - first) / (monotonic() - started_s))
+
+    progress = trainer.run(Watcher(on_step, on_validation, on_bad_picture))
+    if trainer.leads:
+        folder.write_model(store_half)
+        folder.write_card(card_text(plan.to_dict(), data, progress))
+    return progress
+
+
+def _started(plan: RunPlan, data: LabelledData, folder: RunFolder, listener: Listener) -> tuple[DarknetNetwork, int]:
+    cfg_text = compose_cfg(plan.arch, data, plan.params)
+    cfg = parse_cfg(cfg_text, "network.cfg")
+    check_input(cfg)
+    network, transferred = fill_network(cfg, data.classes, plan.weights, plan.params.seed)
+    layers = len(transferred.copied), len(transferred.resized), len(transferred.fresh)
+    listener.on_message(
+        f"{plan.arch}: {layers[0]} convolutions from {transferred.source}, {layers[1]} fitted, {layers[2]} fresh"
+    )
+    facts = {
+        "data": asdict(summarise(data)),
+        "weights_sha256": None if plan.weights is None else file_sha256(plan.weights),
+        "transferred": asdict(transferred),
+        "backbone_layers": backbone_of(network, transferred),
+    }
+    folder.write_start(cfg_text, plan.to_dict(), facts)
+    return network, backbone_of(network, transferred)
+
+
+def _resumed(folder: RunFolder) -> tuple[DarknetNetwork, int]:
+    cfg = read_cfg(folder.cfg)
+    facts = folder.read_start()
+    if cfg.heads[0].classes != len(folder.classes):
+        raise ConfigError(
+            expected=f"the {cfg.heads[0].classes} classes that {folder.path} was started with",
+            found=f"{len(folder.classes)} in the data",
+            fix="give the same data, or start a new run",
+        )
+    return DarknetNetwork(cfg), int(facts["backbone_layers"])
+
+
+def _report_problems(data: LabelledData, listener: Listener) -> None:
+    kinds: dict[str, list[Problem]] = {}
+    for problem in data.problems:
+        kinds.setdefault(problem.kind, []).append(problem)
+    for kind, problems in kinds.items():
+        example = problems[0]
+        listener.on_message(f"{len(problems)} times {kind}, first {example.path}: {example.found}")
+
+
+__all__ = ["Listener", "RunPlan", "read_run", "train_detector"]

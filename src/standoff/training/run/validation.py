@@ -1,0 +1,97 @@
+"""Score a network on labelled pictures while it is being trained."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+import torch
+
+from standoff.core.errors import DataError
+from standoff.core.types import Detections
+from standoff.evaluation.detection import DetectionScore, score_detections
+from standoff.labels import LabelledPicture, load_picture
+from standoff.stages.detect.letterbox import Letterbox, resize
+from standoff.stages.detect.suppression import suppress
+from standoff.training.darknet.network import DarknetNetwork, DecodedNetwork
+
+_LEAST_SCORE = 0.01
+_MOST_ROWS = 1000
+_MOST_DETECTIONS = 300
+_NMS_IOU = 0.45
+
+
+def detect_pictures(
+    network: DarknetNetwork, pictures: Sequence[LabelledPicture], *, bf16: bool
+) -> tuple[list[LabelledPicture], list[Detections]]:
+    """Run a network over pictures, one at a time, letterboxed to its own size.
+
+    Args:
+        network: Left in evaluation mode.
+        pictures: To look at; those that cannot be decoded are left out.
+        bf16: Compute in bfloat16 where it is safe.
+
+    Returns:
+        The pictures that could be read, and what was found in each; class ids are the network's.
+    """
+    device = next(network.parameters()).device
+    size_px = network.cfg.width_px, network.cfg.height_px
+    decoded = DecodedNetwork(network).to(device).eval()
+    readable, found = [], []
+    for picture in pictures:
+        try:
+            image = load_picture(picture)
+        except DataError:
+            continue
+        letterbox = Letterbox.fit(picture.size_px, size_px)
+        blob = letterbox.network_input(resize(image, letterbox.inner_size_px))
+        with torch.inference_mode():
+            with torch.autocast(device.type, torch.bfloat16, enabled=bf16):
+                pixels = torch.from_numpy(blob).to(device).contiguous(memory_format=torch.channels_last)
+                heads = network(pixels)
+            # bfloat16 has 8 bits: a box at 640 px would be rounded to 4.
+            rows = decoded.decode(tuple(head.float() for head in heads))[0].cpu().numpy()
+        readable.append(picture)
+        found.append(read_rows(rows, letterbox))
+    return readable, found
+
+
+def read_rows(rows: npt.NDArray[np.float32], letterbox: Letterbox) -> Detections:
+    """Turn (N, 5 + classes) rows of a decoded network into boxes of the picture, without duplicates."""
+    rows = rows[rows[:, 4] >= _LEAST_SCORE]
+    rows = rows[np.argsort(-rows[:, 4], kind="stable")[:_MOST_ROWS]]
+    scores = rows[:, 5:] * rows[:, 4:5]
+    class_id = scores.argmax(axis=1) if len(scores) else np.empty(0, np.int64)
+    score = scores[np.arange(len(scores)), class_id].astype(np.float64)
+    centre, half = rows[:, 0:2].astype(np.float64), rows[:, 2:4].astype(np.float64) / 2.0
+    xyxy_px = letterbox.to_source(np.concatenate([centre - half, centre + half], axis=1))
+    wanted = (score >= _LEAST_SCORE) & (xyxy_px[:, 2:] > xyxy_px[:, :2]).all(axis=1)
+    return suppress(Detections(xyxy_px, score, class_id)[wanted], _NMS_IOU, _MOST_DETECTIONS)
+
+
+def validate(
+    network: DarknetNetwork,
+    pictures: Sequence[LabelledPicture],
+    classes: tuple[str, ...],
+    *,
+    bf16: bool,
+) -> DetectionScore:
+    """Score a network; see `score_detections`.
+
+    Raises:
+        DataError: None of the pictures can be decoded.
+    """
+    readable, found = detect_pictures(network, pictures, bf16=bf16)
+    if not readable:
+        raise DataError(
+            expected="validation pictures that can be decoded", found=f"none of {len(pictures)}", fix="check the files"
+        )
+    return score_detections(readable, found, classes)
+
+
+def spread(pictures: Sequence[LabelledPicture], count: int) -> tuple[LabelledPicture, ...]:
+    """Return at most `count` pictures, evenly over the sequence."""
+    if len(pictures) <= count:
+        return tuple(pictures)
+    return tuple(pictures[int(index)] for index in np.linspace(0, len(pictures) - 1, count))

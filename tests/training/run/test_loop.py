@@ -1,0 +1,264 @@
+from __future__ import annotations
+
+import math
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+from training.small_runs import CFG, small_params, write_data
+
+from standoff.core.errors import ConfigError, DataError
+from standoff.labels import LabelledData, Problem, read_data
+from standoff.training.darknet.cfg import parse_cfg
+from standoff.training.darknet.network import DarknetNetwork
+from standoff.training.run.checkpoint import load_checkpoint, save_checkpoint
+from standoff.training.run.loop import Progress, Trainer, Watcher
+from standoff.training.run.memory import saying_what_fits
+from standoff.training.run.optimization import AveragedWeights, learning_rate, set_trainable
+from standoff.training.run.params import TrainParams
+from standoff.training.start.initial_weights import initialize_layers
+
+
+def _network(seed: int = 0) -> DarknetNetwork:
+    network = DarknetNetwork(parse_cfg(CFG, "small.cfg"))
+    layers = [index for index, _ in network.convolutions()]
+    initialize_layers(network, layers, torch.Generator().manual_seed(seed))
+    return network
+
+
+def _watcher(
+    losses: list[float] | None = None, bad: list[Problem] | None = None, stop: Callable[[int], None] | None = None
+) -> Watcher:
+    def on_step(step: int, loss: float) -> None:
+        if losses is not None:
+            losses.append(loss)
+        if stop is not None:
+            stop(step)
+
+    def on_bad_picture(problem: Problem) -> None:
+        if bad is not None:
+            bad.append(problem)
+
+    return Watcher(on_step, lambda *_: None, on_bad_picture)
+
+
+def _run(data: LabelledData, folder: Path, params: TrainParams, losses: list[float]) -> Progress:
+    return Trainer(_network(), data, params, folder, 0).run(_watcher(losses))
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory: pytest.TempPathFactory) -> LabelledData:
+    return read_data(write_data(tmp_path_factory.mktemp("blocks")))
+
+
+class _Killed(Exception):
+    pass
+
+
+@pytest.mark.parametrize(("killed_after", "accumulate"), [(5, 1), (7, 1), (9, 2)])
+def test_a_resumed_run_gives_the_curve_of_an_uninterrupted_one(
+    data: LabelledData, tmp_path: Path, killed_after: int, accumulate: int
+) -> None:
+    params = small_params(freeze_steps=3, accumulate=accumulate, scales=(1.0, 0.5), optimizer="adamw")
+    whole: list[float] = []
+    uninterrupted = _run(data, tmp_path / "whole", params, whole)
+
+    def kill(step: int) -> None:
+        if step == killed_after:
+            raise _Killed
+
+    parts: list[float] = []
+    trainer = Trainer(_network(), data, params, tmp_path / "parts", 0)
+    with pytest.raises(_Killed):
+        trainer.run(_watcher(parts, stop=kill))
+    again = Trainer(_network(seed=9), data, params, tmp_path / "parts", 0)
+    assert again.resume() == ()
+    first = again.progress.step
+    resumed = again.run(_watcher(parts := parts[:first]))
+    assert parts == whole
+    without_time = [
+        [{k: v for k, v in row.items() if k != "validation_s"} for row in run.rows] for run in (uninterrupted, resumed)
+    ]
+    assert without_time[0] == without_time[1]
+
+
+def test_a_checkpoint_that_was_cut_short_is_passed_over_for_the_last_good_one(
+    data: LabelledData, tmp_path: Path
+) -> None:
+    params = small_params()
+    _run(data, tmp_path, params, [])
+    newest = max(tmp_path.glob("step-*.pt"))
+    content = newest.read_bytes()
+    for length in (0, 100, len(content) // 2, len(content) - 1):
+        newest.write_bytes(content[:length])
+        state, damaged = load_checkpoint(tmp_path)
+        assert damaged == (newest.name,) and state["progress"]["step"] == 8
+
+
+def test_without_a_whole_checkpoint_nothing_is_resumed(tmp_path: Path) -> None:
+    (tmp_path / "step-0000004.pt").write_bytes(b"half")
+    with pytest.raises(DataError, match=r"only damaged ones \(step-0000004.pt\)"):
+        load_checkpoint(tmp_path)
+
+
+def test_two_checkpoints_are_kept(tmp_path: Path) -> None:
+    for step in (1, 2, 3):
+        save_checkpoint(tmp_path, step, {"step": step})
+    assert [path.name for path in sorted(tmp_path.iterdir())] == ["step-0000002.pt", "step-0000003.pt"]
+
+
+@pytest.mark.parametrize("optimizer", ["adamw", "sgd"])
+@pytest.mark.parametrize("bf16", [False, True])
+def test_training_finds_coloured_blocks(data: LabelledData, tmp_path: Path, optimizer: str, bf16: bool) -> None:
+    params = small_params(
+        steps=160, validate_every=160, checkpoint_every=160, optimizer=optimizer, bf16=bf16, ema=0.9, batch=8,
+        learning_rate=0.01 if optimizer == "adamw" else 0.002,
+    )  # fmt: skip
+    progress = _run(data, tmp_path, params, [])
+    assert progress.best_map > 0.8
+
+
+def test_the_run_stops_when_patience_is_used_up(data: LabelledData, tmp_path: Path) -> None:
+    params = small_params(steps=40, validate_every=2, patience=3, learning_rate=1e-9)
+    progress = _run(data, tmp_path, params, [])
+    assert progress.step == progress.best_step + 6 < 40
+    assert (tmp_path / f"step-{progress.step:07d}.pt").is_file()
+
+
+def test_frozen_layers_do_not_move_and_the_others_do(data: LabelledData, tmp_path: Path) -> None:
+    network, before = _network(), _network()
+    Trainer(network, data, small_params(frozen_layers=2), tmp_path, 0).run(_watcher())
+    for index, ((name, now), then) in enumerate(
+        zip(network.state_dict().items(), before.state_dict().values(), strict=True)
+    ):
+        layer = int(name.split(".")[1])
+        same = torch.equal(now, then)
+        assert same == (layer < 2), (index, name)
+
+
+def test_frozen_statistics_stay_while_the_kernels_move(data: LabelledData, tmp_path: Path) -> None:
+    network, before = _network(), _network()
+    Trainer(network, data, small_params(frozen_norm=True), tmp_path, 2).run(_watcher())
+    now, then = network.state_dict(), before.state_dict()
+    assert torch.equal(now["blocks.1.normalization.running_mean"], then["blocks.1.normalization.running_mean"])
+    assert not torch.equal(now["blocks.2.normalization.running_mean"], then["blocks.2.normalization.running_mean"])
+    assert not torch.equal(now["blocks.1.convolution.weight"], then["blocks.1.convolution.weight"])
+
+
+def test_the_backbone_waits_for_the_freeze_to_end() -> None:
+    network = _network()
+    set_trainable(network, frozen=2, backbone_layers=2, frozen_norm=False)
+    trainable = {
+        index for index, block in enumerate(network.blocks) if any(p.requires_grad for p in block.parameters())
+    }
+    assert trainable == {2, 4}
+    set_trainable(network, frozen=0, backbone_layers=2, frozen_norm=False)
+    assert all(parameter.requires_grad for parameter in network.parameters())
+
+
+def test_a_picture_that_breaks_after_reading_is_named_and_replaced(tmp_path: Path) -> None:
+    data = read_data(write_data(tmp_path / "blocks"))
+    broken = data.splits["train"][3].path
+    broken.write_bytes(broken.read_bytes()[:60])
+    bad: list[Problem] = []
+    progress = Trainer(_network(), data, small_params(steps=20), tmp_path / "run", 0).run(_watcher(bad=bad))
+    assert progress.step == 20
+    assert {problem.path for problem in bad} == {broken}
+
+
+@pytest.mark.parametrize("split", ["train", "val"])
+def test_an_empty_split_is_an_error_in_one_line(data: LabelledData, tmp_path: Path, split: Any) -> None:
+    empty = LabelledData(data.classes, {**data.splits, split: ()}, ())
+    with pytest.raises(DataError, match=f"none in the split '{split}'"):
+        Trainer(_network(), empty, small_params(), tmp_path, 0)
+
+
+def test_a_loss_that_explodes_ends_the_run_with_advice(data: LabelledData, tmp_path: Path) -> None:
+    network = _network()
+    with torch.no_grad():
+        network.convolutions()[0][1].convolution.weight.fill_(math.inf)
+    with pytest.raises(DataError, match="expected a finite loss, found nan at step 1"):
+        Trainer(network, data, small_params(), tmp_path, 0).run(_watcher())
+
+
+@pytest.mark.parametrize(
+    ("fits", "advice"), [(5, "Set batch to 4, which fits, and accumulate to 4"), (0, "not even one picture")]
+)
+@pytest.mark.parametrize("kind", [MemoryError, torch.OutOfMemoryError, "can't allocate memory: you tried"])
+def test_out_of_memory_says_which_batch_fits(fits: int, advice: str, kind: Any) -> None:
+    failure = RuntimeError(kind) if isinstance(kind, str) else kind()
+
+    def attempt(pictures: int) -> None:
+        if pictures > fits:
+            raise failure
+
+    with pytest.raises(ConfigError, match=advice), saying_what_fits(16, attempt):
+        raise failure
+
+
+def test_other_errors_are_not_taken_for_a_lack_of_memory() -> None:
+    with pytest.raises(RuntimeError, match="shapes"), saying_what_fits(16, lambda _: None):
+        raise RuntimeError("shapes differ")
+
+
+def test_the_learning_rate_rises_and_then_only_falls() -> None:
+    params = small_params(steps=200, warmup_steps=20)
+    rates = [learning_rate(step, params) for step in range(201)]
+    assert max(rates) == pytest.approx(params.learning_rate)
+    assert rates[:20] == sorted(rates[:20]) and rates[20:] == sorted(rates[20:], reverse=True)
+    assert rates[-1] == pytest.approx(params.learning_rate * params.final_share)
+
+
+def test_averaged_weights_end_where_the_weights_rest() -> None:
+    network = _network()
+    average = AveragedWeights(network, 0.9)
+    with torch.no_grad():
+        network.convolutions()[0][1].convolution.weight.fill_(2.0)
+    for _ in range(3000):
+        average.update(network)
+    torch.testing.assert_close(
+        average.state["blocks.0.convolution.weight"], network.state_dict()["blocks.0.convolution.weight"]
+    )
+
+
+_CREW_SCRIPT = """
+import sys, torch
+from pathlib import Path
+from training.run.test_loop import _network, _watcher
+from training.small_runs import small_params
+from standoff.labels import read_data
+from standoff.training.run.loop import Trainer
+torch.set_num_threads(1)
+rank = int(__import__("os").environ["RANK"])
+network = _network()
+trainer = Trainer(network, read_data(Path(sys.argv[1])), small_params(steps=4, validate_every=4), Path(sys.argv[2]), 0)
+seen = []
+trainer.run(_watcher(seen))
+result = {"state": network.state_dict(), "losses": seen, "rows": len(trainer.progress.rows)}
+torch.save(result, Path(sys.argv[2]) / f"rank{rank}")
+"""
+
+
+def test_two_processes_end_with_the_same_weights_from_different_pictures(data: LabelledData, tmp_path: Path) -> None:
+    folder = data.splits["train"][0].path.parents[2]
+    script = tmp_path / "crew.py"
+    script.write_text(_CREW_SCRIPT)
+    tests = Path(__file__).parents[2]
+    environment = {
+        **os.environ,
+        "PYTHONPATH": f"{tests}{os.pathsep}{os.environ.get('PYTHONPATH', '')}",
+        "OMP_NUM_THREADS": "1",
+    }
+    launch = [sys.executable, "-m", "torch.distributed.run", "--standalone", "--nproc-per-node=2"]
+    subprocess.run([*launch, str(script), str(folder), str(tmp_path)], check=True, env=environment, capture_output=True)
+    first, second = (torch.load(tmp_path / f"rank{rank}", weights_only=True) for rank in (0, 1))
+    assert first["losses"] != second["losses"]
+    assert (first["rows"], second["rows"]) == (1, 0)
+    for name, value in first["state"].items():
+        if "running" not in name and "num_batches" not in name:
+            torch.testing.assert_close(value, second["state"][name])

@@ -1,0 +1,170 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+import yaml
+from tolerances import FLOAT32_BOX_PX
+from training.small_runs import CFG, CLASSES, small_params, write_data
+
+from standoff.core.errors import ConfigError, DataError, ModelError, OutputError
+from standoff.core.types import Frame
+from standoff.labels import read_data
+from standoff.stages.detect import DetectParams, OnnxDetector
+from standoff.stages.frames.pictures import ArrayPicture
+from standoff.training.darknet.cfg import read_cfg
+from standoff.training.darknet.network import DarknetNetwork
+from standoff.training.darknet.weights import load_weights
+from standoff.training.run.train import Listener, RunPlan, read_run, train_detector
+from standoff.training.run.validation import detect_pictures, spread
+from standoff.training.start.starting_point import backbone_of, fill_network
+
+
+class _Heard:
+    def __init__(self) -> None:
+        self.messages: list[str] = []
+        self.rows: list[dict[str, Any]] = []
+
+    def listener(self) -> Listener:
+        return Listener(self.messages.append, lambda *_: None, self.rows.append)
+
+
+def _plan(folder: Path, **changes: object) -> RunPlan:
+    (folder / "small.cfg").write_text(CFG)
+    data = folder / "blocks"
+    return RunPlan(write_data(data), str(folder / "small.cfg"), None, small_params(**changes))
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[RunPlan, Path, _Heard]:
+    folder = tmp_path_factory.mktemp("finished")
+    plan, heard = _plan(folder, steps=90, validate_every=30, checkpoint_every=30, ema=0.9), _Heard()
+    train_detector(plan, folder / "run", heard.listener())
+    return plan, folder / "run", heard
+
+
+def test_a_run_leaves_all_that_it_takes_to_judge_and_to_use_it(finished: tuple[RunPlan, Path, _Heard]) -> None:
+    _, out, heard = finished
+    names = {path.name for path in out.iterdir()}
+    assert names == {
+        "network.cfg", "classes.names", "run.yaml", "start.json", "checkpoints", "history.json", "table.md",
+        "curves.png", "predictions.jpg", "best.json", "best.weights", "last.weights", "model.onnx", "model-half.onnx",
+        "model-card.md",
+    }  # fmt: skip
+    assert [row["step"] for row in heard.rows] == [30, 60, 90]
+    assert json.loads((out / "history.json").read_text()) == heard.rows
+    assert len((out / "table.md").read_text().splitlines()) == 2 + 3
+    for name in ("curves.png", "predictions.jpg"):
+        picture = cv2.imread(str(out / name))
+        assert picture is not None and picture.std() > 10
+
+
+def test_the_exported_model_sees_what_the_network_sees(finished: tuple[RunPlan, Path, _Heard]) -> None:
+    plan, out, _ = finished
+    network = DarknetNetwork(read_cfg(out / "network.cfg"))
+    load_weights(network, out / "best.weights")
+    pictures = read_data(plan.data).splits["val"]
+    _, found = detect_pictures(network, pictures, bf16=False)
+    detector = OnnxDetector(out / "model.onnx", DetectParams(score_threshold=0.01))
+    site_class = np.array([0, 5])
+    for picture, own in zip(pictures, found, strict=True):
+        image = cv2.imread(str(picture.path))
+        seen = detector.detect(Frame("test", 0, 0.0, ArrayPicture(np.asarray(image, dtype=np.uint8))))
+        assert len(seen) == len(own) > 0
+        np.testing.assert_allclose(seen.xyxy_px, own.xyxy_px, atol=FLOAT32_BOX_PX)
+        np.testing.assert_array_equal(seen.class_id, site_class[own.class_id])
+
+
+def test_the_run_can_be_repeated_from_its_own_record(finished: tuple[RunPlan, Path, _Heard], tmp_path: Path) -> None:
+    plan, out, heard = finished
+    recorded = read_run(out)
+    assert recorded == plan.to_dict()
+    again = _Heard()
+    train_detector(plan, tmp_path / "again", again.listener())
+    for first, second in zip(heard.rows, again.rows, strict=True):
+        assert {**first, "validation_s": 0} == {**second, "validation_s": 0}
+    assert (tmp_path / "again" / "best.weights").read_bytes() == (out / "best.weights").read_bytes()
+
+
+def test_a_run_goes_on_in_its_folder(tmp_path: Path) -> None:
+    plan = _plan(tmp_path, steps=8, validate_every=4, checkpoint_every=4)
+    whole, parts = _Heard(), _Heard()
+    train_detector(plan, tmp_path / "whole", whole.listener())
+    train_detector(plan, tmp_path / "parts", parts.listener())
+    newest = tmp_path / "parts" / "checkpoints" / "step-0000008.pt"
+    newest.write_bytes(newest.read_bytes()[:500])
+    resumed = _Heard()
+    train_detector(plan, tmp_path / "parts", resumed.listener(), resumes=True)
+    assert [row["step"] for row in resumed.rows] == [8]
+    assert {**resumed.rows[0], "validation_s": 0} == {**whole.rows[1], "validation_s": 0}
+    assert any("step-0000008.pt is damaged" in message for message in resumed.messages)
+
+
+def test_a_folder_in_use_is_not_written_to(tmp_path: Path) -> None:
+    plan = _plan(tmp_path)
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "mine.txt").write_text("keep")
+    with pytest.raises(OutputError, match="pass --resume"):
+        train_detector(plan, tmp_path / "run", _Heard().listener())
+    with pytest.raises(ConfigError, match=r"no run\.yaml"):
+        read_run(tmp_path / "run")
+
+
+def test_weights_of_another_architecture_are_refused_before_anything_is_written(tmp_path: Path) -> None:
+    plan = _plan(tmp_path)
+    stranger = tmp_path / "stranger.weights"
+    stranger.write_bytes(np.concatenate([np.zeros(5, np.float32), np.full(40_000, 1e-3, np.float32)]).tobytes())
+    with pytest.raises(ModelError):
+        train_detector(RunPlan(plan.data, plan.arch, stranger, plan.params), tmp_path / "run", _Heard().listener())
+    assert not (tmp_path / "run").exists()
+
+
+def test_labels_without_a_box_cannot_give_anchors(tmp_path: Path) -> None:
+    plan = _plan(tmp_path)
+    for path in (plan.data / "labels").rglob("*.txt"):
+        path.write_text("")
+    with pytest.raises(DataError, match="labelled boxes with positive sides, to find anchors, found none"):
+        train_detector(plan, tmp_path / "run", _Heard().listener())
+
+
+def test_problems_of_the_data_are_counted_and_named_once_a_kind(tmp_path: Path) -> None:
+    plan = _plan(tmp_path, steps=4, warmup_steps=1, validate_every=4)
+    labels = sorted((plan.data / "labels" / "train").iterdir())
+    for path in labels[:3]:
+        path.write_text(path.read_text() + "9 0.5 0.5 0.1 0.1\n")
+    heard = _Heard()
+    train_detector(plan, tmp_path / "run", heard.listener())
+    assert sum(message.startswith("3 times ") and labels[0].stem in message for message in heard.messages) == 1
+
+
+def test_an_unknown_architecture_is_answered_with_the_known_ones(tmp_path: Path) -> None:
+    plan = _plan(tmp_path)
+    with pytest.raises(ConfigError, match="yolov3-tiny"):
+        train_detector(RunPlan(plan.data, "yolov9", None, plan.params), tmp_path / "run", _Heard().listener())
+
+
+def test_the_backbone_is_what_the_weights_filled(finished: tuple[RunPlan, Path, _Heard]) -> None:
+    _, out, _ = finished
+    cfg = read_cfg(out / "network.cfg")
+    network, transferred = fill_network(cfg, CLASSES, out / "best.weights", seed=0)
+    assert backbone_of(network, transferred) == len(cfg.layers)
+    network, transferred = fill_network(cfg, CLASSES, None, seed=0)
+    assert backbone_of(network, transferred) == 0
+
+
+def test_pictures_to_validate_with_are_spread_over_all(finished: tuple[RunPlan, Path, _Heard]) -> None:
+    pictures = read_data(finished[0].data).splits["train"]
+    few = spread(pictures, 4)
+    assert [few[0], few[-1]] == [pictures[0], pictures[-1]] and len(few) == 4
+    assert spread(pictures, 1000) == pictures
+
+
+def test_the_card_says_how_to_repeat_the_run(finished: tuple[RunPlan, Path, _Heard]) -> None:
+    plan, out, _ = finished
+    card = (out / "model-card.md").read_text()
+    repeated = yaml.safe_load(card.split("```yaml\n")[1].split("```")[0])
+    assert repeated == plan.to_dict()
