@@ -29,7 +29,9 @@ def detection(
             show_default=False,
         ),
     ],
-    model: Annotated[list[Path], typer.Option(help="Detector, ONNX; may be repeated.", show_default=False)],
+    model: Annotated[
+        list[str], typer.Option(help="Detector: site, site-int8, or ONNX; may be repeated.", show_default=False)
+    ],
     split: Annotated[Split, typer.Option(help="Of labelled pictures.")] = "test",
     slices: Annotated[
         list[str] | None, typer.Option(help="Slices, COLUMNSxROWS: one for all models or one for each. [default: 1x1]")
@@ -60,10 +62,11 @@ def detection(
     from standoff.evaluation.detection.figures import write_figures
     from standoff.evaluation.detection.grouping import site_grouping
     from standoff.evaluation.detection.material import open_material
+    from standoff.stages.detect import find_model
 
     require_pycocotools()
     grouping = site_grouping(merge_machines=merge_machines, without=without or ())
-    candidates = _candidates(model, slices or ["1x1"])
+    candidates = _candidates([find_model(name) for name in model], slices or ["1x1"])
     material = open_material(data, split=split, video=video, frames=frame_range(frames), limit=limit)
     comparison = _compare(candidates, material, grouping, iou, at or [])
     if json_file is not None:

@@ -16,6 +16,7 @@ from standoff.labels.checks import check_boxes, inside
 from standoff.labels.documents import read_yaml
 from standoff.labels.layout import YAML_SUFFIXES, read_negatives, read_set
 from standoff.labels.mixture import DROP, IGNORE, Mixture, Source, read_mixture
+from standoff.labels.regions import read_regions
 from standoff.labels.source import BadPicture, SourcePicture, SourceSet
 from standoff.labels.splits import group_of, split_pictures
 from standoff.labels.types import SPLITS, LabelledData, LabelledPicture, Problem, Split
@@ -176,25 +177,7 @@ def _read_regions(source: Source) -> dict[str, FloatArray]:
     """Return (N, 4) boxes in which nothing is known, by the stem of the picture."""
     folder = source.path if source.path.is_dir() else source.path.parent
     path = source.ignore_regions or folder / _OWN_REGIONS
-    if source.ignore_regions is None and not path.is_file():
-        return {}
-    regions = {str(stem): _corners(boxes) for stem, boxes in read_yaml(path).items()}
-    wrong = sorted(stem for stem, boxes in regions.items() if boxes is None)
-    if wrong:
-        raise DataError(
-            expected=f"[[x1, y1, x2, y2], ...] of each picture in {path}",
-            found=f"something else for {', '.join(wrong)}",
-            fix="correct the file",
-        )
-    return {stem: boxes for stem, boxes in regions.items() if boxes is not None}
-
-
-def _corners(boxes: object) -> FloatArray | None:
-    try:
-        corners = np.array(boxes, dtype=np.float64).reshape(-1, 4)
-    except (TypeError, ValueError):
-        return None
-    return corners if np.isfinite(corners).all() and (corners[:, :2] < corners[:, 2:]).all() else None
+    return read_regions(path) if source.ignore_regions is not None or path.is_file() else {}
 
 
 def _require_enough(source: Source, good: int, problems: Sequence[Problem]) -> None:

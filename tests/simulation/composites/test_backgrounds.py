@@ -48,6 +48,20 @@ def test_a_list_carries_labels_scale_and_ignored_places(tmp_path: Path) -> None:
     np.testing.assert_allclose(found.ignored_px, [[0.0, 0.0, 5.0, 5.0], [-0.5, 26.5, 9.5, 32.5]], atol=1e-4)
 
 
+def test_ignored_regions_can_be_given_by_picture_and_paths_have_variables(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("f-1.jpg", "f-2.jpg"):
+        _photograph(tmp_path / "far" / name)
+    monkeypatch.setenv("PHOTOGRAPHS", str(tmp_path / "far"))
+    (tmp_path / "unknown.yaml").write_text("f-2: [[1, 2, 3, 4], [5, 6, 7, 8]]")
+    entry = {"pictures": "$PHOTOGRAPHS/*.jpg", "ignore_px": [[0, 0, 5, 5]], "ignore_regions": "unknown.yaml"}
+    (tmp_path / "list.yaml").write_text(yaml.safe_dump([entry]))
+    first, second = find_backgrounds([str(tmp_path / "list.yaml")])
+    assert first.ignored_px.tolist() == [[0, 0, 5, 5]]
+    assert second.ignored_px.tolist() == [[0, 0, 5, 5], [1, 2, 3, 4], [5, 6, 7, 8]]
+
+
 @pytest.mark.parametrize(
     "content",
     ["{a: 1}", "- {view: nadir}", "- {pictures: '*.jpg', colour: red}", "- {pictures: '*.jpg', view: sideways}",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
@@ -17,6 +18,7 @@ from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.errors import DataError
 from standoff.core.homography import FloatArray
 from standoff.core.types import IntArray
+from standoff.labels.regions import read_regions
 from standoff.simulation.presets import Condition
 
 _SUFFIXES = (".jpg", ".jpeg", ".png")
@@ -24,7 +26,13 @@ _CAR_M = 4.6
 _DAYLIGHT: tuple[Condition, ...] = ("noon", "afternoon", "hazy", "overcast")
 _PITCHES_DEG = {"nadir": 90.0, "oblique": 40.0}
 _IGNORE = "ignore"
-_KEYS = frozenset({"pictures", "view", "pitch_deg", "px_per_m", "light", "shadow_deg", "labels", "ignore_px", "group"})
+_NOWHERE = np.empty((0, 4))
+_KEYS = frozenset(
+    {
+        "pictures", "view", "pitch_deg", "px_per_m", "light", "shadow_deg", "labels", "ignore_px", "ignore_regions",
+        "group",
+    }
+)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,7 +81,7 @@ def find_backgrounds(sources: Sequence[str]) -> tuple[Background, ...]:
             found += _listed(Path(source))
         else:
             folder, _, view = source.partition(":")
-            found += _described(_below(Path(folder)), {"view": view or "nadir"}, source)
+            found += _described(_below(Path(folder)), {"view": view or "nadir"}, Path(source))
     if not found:
         raise DataError(
             expected="photographs of ground (.jpg, .png)", found=f"none in {', '.join(sources)}", fix="name a folder"
@@ -126,14 +134,23 @@ def _listed(file: Path) -> list[Background]:
         raise DataError(expected="a YAML list of backgrounds", found=f"another thing in {file}", fix="begin with '- '")
     found: list[Background] = []
     for entry in entries:
-        paths = sorted(file.parent.glob(entry["pictures"])) if "pictures" in entry else []
+        paths = _matching(file.parent, str(entry.get("pictures", "")))
         if not paths:
             raise DataError(expected="photographs under `pictures`", found=f"none in {file}", fix="check the pattern")
-        found += _described(paths, entry, str(file))
+        found += _described(paths, entry, file)
     return found
 
 
-def _described(paths: Sequence[Path], entry: Mapping[str, Any], source: str) -> list[Background]:
+def _near(folder: Path, name: str) -> Path:
+    return folder / Path(os.path.expandvars(name)).expanduser()
+
+
+def _matching(folder: Path, pattern: str) -> list[Path]:
+    path = _near(folder, pattern)
+    return sorted(path.parent.glob(path.name)) if pattern else []
+
+
+def _described(paths: Sequence[Path], entry: Mapping[str, Any], source: Path) -> list[Background]:
     unknown = sorted(set(entry) - _KEYS)
     view, light = entry.get("view", "nadir"), tuple(entry.get("light", _DAYLIGHT))
     wrong = unknown + [view] * (view not in _PITCHES_DEG) + [name for name in light if name not in get_args(Condition)]
@@ -143,12 +160,16 @@ def _described(paths: Sequence[Path], entry: Mapping[str, Any], source: str) -> 
             found=f"{', '.join(map(repr, wrong))} in {source}",
             fix="correct it",
         )
-    return [_background(path, entry, float(entry.get("pitch_deg", _PITCHES_DEG[view])), light) for path in paths]
+    regions = read_regions(_near(source.parent, entry["ignore_regions"])) if "ignore_regions" in entry else {}
+    known = {**entry, "pitch_deg": float(entry.get("pitch_deg", _PITCHES_DEG[view]))}
+    return [_background(path, known, light, regions.get(path.stem, _NOWHERE)) for path in paths]
 
 
-def _background(path: Path, entry: Mapping[str, Any], pitch_deg: float, light: tuple[Condition, ...]) -> Background:
+def _background(
+    path: Path, entry: Mapping[str, Any], light: tuple[Condition, ...], regions_px: FloatArray
+) -> Background:
     xyxy_px, ids = np.empty((0, 4)), np.empty(0, np.int64)
-    ignored_px = np.array(entry.get("ignore_px", []), dtype=np.float64).reshape(-1, 4)
+    ignored_px = np.concatenate([np.array(entry.get("ignore_px", []), dtype=np.float64).reshape(-1, 4), regions_px])
     px_per_m = entry.get("px_per_m")
     if entry.get("labels"):
         boxes_px, names = _read_labels(path, entry["labels"])
@@ -160,7 +181,9 @@ def _background(path: Path, entry: Mapping[str, Any], pitch_deg: float, light: t
         if px_per_m is None and len(cars):
             px_per_m = float(np.median((cars[:, 2:] - cars[:, :2]).max(axis=1))) / _CAR_M
     group = str(entry.get("group", group_of(path)))
-    return Background(path, group, pitch_deg, px_per_m, light, entry.get("shadow_deg"), xyxy_px, ids, ignored_px)
+    return Background(
+        path, group, entry["pitch_deg"], px_per_m, light, entry.get("shadow_deg"), xyxy_px, ids, ignored_px
+    )
 
 
 def _read_labels(path: Path, names: Mapping[int, str]) -> tuple[FloatArray, list[str]]:

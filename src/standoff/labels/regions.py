@@ -1,0 +1,39 @@
+"""Regions of pictures in which nothing is known: crowds, car parks, whatever a set does not label."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from standoff.core.errors import DataError
+from standoff.core.homography import FloatArray
+from standoff.labels.documents import read_yaml
+
+
+def read_regions(path: Path) -> dict[str, FloatArray]:
+    """Read (N, 4) left, top, right, bottom, in pixels, by the stem of the picture.
+
+    Args:
+        path: YAML of `stem: [[x1, y1, x2, y2], ...]`.
+
+    Raises:
+        DataError: It cannot be read, or holds something else.
+    """
+    regions = {str(stem): _corners(boxes) for stem, boxes in read_yaml(path).items()}
+    wrong = sorted(stem for stem, boxes in regions.items() if boxes is None)
+    if wrong:
+        raise DataError(
+            expected=f"[[x1, y1, x2, y2], ...] of each picture in {path}",
+            found=f"something else for {', '.join(wrong)}",
+            fix="correct the file",
+        )
+    return {stem: boxes for stem, boxes in regions.items() if boxes is not None}
+
+
+def _corners(boxes: object) -> FloatArray | None:
+    try:
+        corners = np.array(boxes, dtype=np.float64).reshape(-1, 4)
+    except (TypeError, ValueError):
+        return None
+    return corners if np.isfinite(corners).all() and (corners[:, :2] < corners[:, 2:]).all() else None
