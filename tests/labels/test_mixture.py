@@ -65,7 +65,7 @@ def test_negatives_and_ignored_regions(tmp_path: Path) -> None:
     for stem in ("park", "road"):
         write_picture(tmp_path / "bare" / f"{stem}.png")
     _flights(tmp_path / "f")
-    regions = {"park": [[0, 0, 10, 10], [30, 20, 90, 90], [50, 50, 60, 60]]}
+    regions = {"park": [[0, 0, 10, 10], [30, 20, 90, 90], [50, 50, 60, 60], [7, 7, 7, 9]]}
     (tmp_path / "regions.yaml").write_text(yaml.safe_dump(regions))
     bare: dict[str, object] = {"path": "bare", "negatives": True, "split": "train", "ignore_regions": "regions.yaml"}
     pictures = by_stem(read_data(write_mixture(tmp_path / "m.yaml", bare, {"path": "f"})))

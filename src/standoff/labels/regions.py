@@ -36,4 +36,4 @@ def _corners(boxes: object) -> FloatArray | None:
         corners = np.array(boxes, dtype=np.float64).reshape(-1, 4)
     except (TypeError, ValueError):
         return None
-    return corners if np.isfinite(corners).all() and (corners[:, :2] < corners[:, 2:]).all() else None
+    return corners if np.isfinite(corners).all() and (corners[:, :2] <= corners[:, 2:]).all() else None

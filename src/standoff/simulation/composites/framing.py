@@ -39,6 +39,7 @@ _TRIES, _GROWTH = 60, 1.025
 _DISTINCT_DEG = 14.0
 """The upper edge of the picture looks at least so far below the horizon."""
 _OVERSIZE = 1.2
+_LEAST_IGNORED_PX = 1.0
 _INSIDE = 0.35
 """Share of a mark that must be in the picture; less is left to chance."""
 
@@ -88,7 +89,9 @@ def frame(rng: np.random.Generator, background: Background, size_px: tuple[int, 
             break
     xyxy_px, inside = _carried(background.xyxy_px, onto, size_px)
     ignored_px, _ = _carried(background.ignored_px, onto, size_px)
-    scant = ~inside & ~np.isnan(xyxy_px[:, 0])
+    unknown_px = np.concatenate([ignored_px, xyxy_px[~inside]])
+    # Outside they are NaN, and at the very edge nothing is left of them.
+    is_there = (unknown_px[:, 2:] - unknown_px[:, :2] >= _LEAST_IGNORED_PX).all(axis=1)
     return Framed(
         _seen(photo, onto, zoom, size_px),
         view,
@@ -96,7 +99,7 @@ def frame(rng: np.random.Generator, background: Background, size_px: tuple[int, 
         background.shadow_deg,
         xyxy_px[inside],
         background.class_id[inside],
-        np.concatenate([ignored_px[~np.isnan(ignored_px[:, 0])], xyxy_px[scant]]),
+        unknown_px[is_there],
     )
 
 
