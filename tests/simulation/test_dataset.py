@@ -15,8 +15,9 @@ from pycocotools.coco import COCO
 
 from standoff.core.classes import CLASSES
 from standoff.core.errors import ConfigError, OutputError
+from standoff.labels.types import SPLITS
 from standoff.simulation.dataset import DatasetPlan, record_dataset
-from standoff.simulation.picture_set import SPLITS, is_marked
+from standoff.simulation.picture_set import is_marked
 
 _SIZE_PX = (192, 108)
 _PLAN = DatasetPlan(

@@ -12,11 +12,12 @@ from typing import Literal, get_args
 import cv2
 import numpy as np
 
+from standoff.labels.types import Split
 from standoff.simulation.covers import COVER_KINDS
 from standoff.simulation.crew import work_through
 from standoff.simulation.moment import scene_at
 from standoff.simulation.output import whole_folder
-from standoff.simulation.picture_set import Picture, PictureSet, is_marked
+from standoff.simulation.picture_set import Picture, PictureSet, draw_split, is_marked
 from standoff.simulation.presets import MAX_SEED, Condition, CoverPlan, Plan, Preset, check_seed, check_size
 from standoff.simulation.render import Look
 from standoff.simulation.scene import Scene
@@ -68,15 +69,9 @@ class DatasetPlan:
         """Return how many scenes it takes."""
         return -(-self.images // self.per_scene)
 
-    def split_of(self, scene: int) -> str:
-        """Return the split of a scene: the held-out ones come first in a fixed shuffled order.
-
-        One scene alone is all train.
-        """
-        order = np.random.default_rng([self.seed, 15485863]).permutation(self.scenes)
-        place = int(np.flatnonzero(order == scene)[0])
-        held_out = round(self.held_out * self.scenes)
-        return "val" if place < held_out else "test" if place < 2 * held_out else "train"
+    def split_of(self, scene: int) -> Split:
+        """Return the split of a scene; one scene alone is all train."""
+        return draw_split([self.seed, 15485863], scene, self.scenes, self.held_out)
 
 
 def record_dataset(

@@ -8,13 +8,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
 import yaml
 
 from standoff.core.classes import CLASSES
+from standoff.labels.types import SPLITS, Split
 from standoff.simulation.coco import Annotations
 from standoff.simulation.truth import Row
 
-SPLITS = ("train", "val", "test")
 _MIN_VISIBLE_PX, _MIN_SIDE_PX = 16, 6
 _MIN_VISIBLE_SHARE = 0.15
 _PLAIN_PX = 1500
@@ -45,6 +46,23 @@ class Picture:
     about: Mapping[str, Any] = field(default_factory=dict)
 
 
+def draw_split(key: Sequence[int], index: int, count: int, held_out: float) -> Split:
+    """Return the split of one of `count` things: the first of a fixed shuffled order are held out.
+
+    Args:
+        key: Seeds of the order.
+        index: Of the thing.
+        count: How many there are.
+        held_out: Share for each of val and test; of few things it may round to none.
+
+    >>> sorted(draw_split([7], index, 10, 0.2) for index in range(10))
+    ['test', 'test', 'train', 'train', 'train', 'train', 'train', 'train', 'val', 'val']
+    """
+    place = int(np.flatnonzero(np.random.default_rng(key).permutation(count) == index)[0])
+    held = round(held_out * count)
+    return "val" if place < held else "test" if place < 2 * held else "train"
+
+
 class PictureSet:
     """Writes pictures with their labels, one by one.
 
@@ -62,7 +80,7 @@ class PictureSet:
             if layout == "yolo":
                 (folder / "labels" / split).mkdir(parents=True)
 
-    def add(self, split: str, picture: Picture) -> None:
+    def add(self, split: Split, picture: Picture) -> None:
         """Write a picture and, in YOLO's layout, its labels."""
         (self._folder / "images" / split / picture.name).write_bytes(picture.jpeg)
         if self._layout == "yolo":
@@ -89,7 +107,7 @@ class PictureSet:
         if self._ignored:
             (self._folder / "ignore.yaml").write_text(yaml.safe_dump(self._ignored, default_flow_style=None))
         names = {site_class.id: site_class.name for site_class in CLASSES}
-        content = {**{split: f"images/{split}" for split in SPLITS}, "names": names}
+        content: dict[str, Any] = {**{split: f"images/{split}" for split in SPLITS}, "names": names}
         (self._folder / "data.yaml").write_text(yaml.safe_dump(content, sort_keys=False))
         (self._folder / "dataset.json").write_text(json.dumps(settings))
 

@@ -19,6 +19,7 @@ from standoff.core.errors import DataError
 from standoff.core.homography import FloatArray
 from standoff.core.types import IntArray
 from standoff.labels.regions import read_regions
+from standoff.labels.types import Split
 from standoff.simulation.presets import Condition
 
 _SUFFIXES = (".jpg", ".jpeg", ".png")
@@ -98,7 +99,7 @@ def group_of(path: Path) -> str:
     return re.sub(r"[-_ .]*\d+$", "", path.stem) or "photographs"
 
 
-def split_backgrounds(backgrounds: Sequence[Background], held_out: float) -> dict[str, tuple[Background, ...]]:
+def split_backgrounds(backgrounds: Sequence[Background], held_out: float) -> dict[Split, tuple[Background, ...]]:
     """Divide the flights among train, val and test: the smallest are held out, so that training sees most ground.
 
     Args:
@@ -113,7 +114,11 @@ def split_backgrounds(backgrounds: Sequence[Background], held_out: float) -> dic
         flights[background.group].append(background)
     by_size = sorted(flights, key=lambda group: (len(flights[group]), group))
     apart = max(round(held_out * len(by_size)), 1) if held_out > 0.0 and len(by_size) >= 3 else 0
-    shares = {"val": by_size[:apart], "test": by_size[apart : 2 * apart], "train": by_size[2 * apart :]}
+    shares: dict[Split, list[str]] = {
+        "val": by_size[:apart],
+        "test": by_size[apart : 2 * apart],
+        "train": by_size[2 * apart :],
+    }
     return {split: tuple(b for group in groups for b in flights[group]) for split, groups in shares.items()}
 
 

@@ -15,6 +15,7 @@ import shapely
 from standoff.core.homography import FloatArray
 from standoff.core.pose import View
 from standoff.core.types import ImageArray
+from standoff.labels.types import Split
 from standoff.simulation.composites.backgrounds import Background, find_backgrounds, split_backgrounds
 from standoff.simulation.composites.blending import Match, blend
 from standoff.simulation.composites.company import MOMENT_S, Company, gather
@@ -25,7 +26,7 @@ from standoff.simulation.flight import Still
 from standoff.simulation.light import random_light
 from standoff.simulation.moment import Moment, scene_at
 from standoff.simulation.output import whole_folder
-from standoff.simulation.picture_set import Picture, PictureSet, is_marked
+from standoff.simulation.picture_set import Picture, PictureSet, draw_split, is_marked
 from standoff.simulation.presets import Condition, check_seed, check_size
 from standoff.simulation.render import Cutout, Renderer
 from standoff.simulation.scene import Light, Scene
@@ -73,11 +74,9 @@ class CompositePlan:
         check_seed(self.seed)
         check_size(self.width_px, self.height_px)
 
-    def split_of(self, index: int, splits: dict[str, tuple[Background, ...]]) -> str:
+    def split_of(self, index: int, splits: dict[Split, tuple[Background, ...]]) -> Split:
         """Return the split of a picture; without flights that are held out all pictures are for training."""
-        order = np.random.default_rng([self.seed, 32452843]).permutation(self.images)
-        place, held_out = int(np.flatnonzero(order == index)[0]), round(self.held_out * self.images)
-        split = "val" if place < held_out else "test" if place < 2 * held_out else "train"
+        split = draw_split([self.seed, 32452843], index, self.images, self.held_out)
         return split if splits[split] else "train"
 
 
