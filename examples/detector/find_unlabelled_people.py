@@ -4,7 +4,7 @@ In the photographs of a hovering drone only vehicles are labelled. Trained on as
 that people are ground. What differs from the median of all photographs of a flight, after their alignment, and is no
 labelled vehicle, becomes a region of which nothing is known.
 
-    python find_unlabelled_people.py AERIAL_VEHICLES_FOLDER unlabelled_people.yaml
+    python find_unlabelled_people.py AERIAL_VEHICLES_FOLDER unlabelled.yaml
 """
 
 from __future__ import annotations
@@ -24,6 +24,8 @@ Picture = npt.NDArray[np.uint8]
 Matrix = npt.NDArray[np.float64]
 
 _FLIGHT = re.compile(r"(DJI[-_]\d+)-\d+$")
+_STILL = re.compile(r"DJI_\d+$")
+"""A single photograph: there is no saying what moves, so that nothing is known of all of it."""
 _LEAST_PICTURES = 4
 """For a median that shows the ground and not the traffic."""
 _CORNERS = 4000
@@ -40,11 +42,14 @@ _CYCLIST = 4
 def find_regions(folder: Path) -> dict[str, list[list[float]]]:
     """Return regions (left, top, right, bottom; px) by picture stem."""
     flights: dict[str, list[Path]] = defaultdict(list)
+    regions: dict[str, list[list[float]]] = {}
     for path in sorted((folder / "images").iterdir()):
         match = _FLIGHT.match(path.stem)
         if match:
             flights[match.group(1)].append(path)
-    regions: dict[str, list[list[float]]] = {}
+        elif _STILL.match(path.stem):
+            height, width = _read(path).shape[:2]
+            regions[path.stem] = [[0.0, 0.0, float(width), float(height)]]
     for paths in flights.values():
         if len(paths) >= _LEAST_PICTURES:
             regions |= _find_in_flight(paths, folder / "labels")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -73,7 +74,7 @@ def train(
 
 
 def _read_plan(path: Path) -> dict[str, Any]:
-    """Read a plan; paths in it are relative to it."""
+    """Read a plan; paths in it are relative to it, `$VARIABLES` and `~` are expanded."""
     from standoff.config import read_settings_file
 
     plan = read_settings_file(path)
@@ -84,7 +85,7 @@ def _read_plan(path: Path) -> dict[str, Any]:
         )
     for name in ("data", "weights"):
         if plan.get(name) is not None:
-            plan[name] = path.parent / Path(str(plan[name])).expanduser()
+            plan[name] = path.parent / Path(os.path.expandvars(str(plan[name]))).expanduser()
     if str(plan.get("arch", "")).endswith(".cfg"):
         plan["arch"] = str(path.parent / plan["arch"])
     return plan
