@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 def label(
     source: Annotated[Path, typer.Argument(help="Video file, or a folder of pictures.", show_default=False)],
-    model: Annotated[Path, typer.Option(help="Detector, ONNX.", show_default=False)],
+    model: Annotated[str, typer.Option(help="Detector: site, site-int8, or ONNX.", show_default=False)],
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for pictures and boxes.", show_default=False)],
     frames: Annotated[int, typer.Option(min=1, help="How many to choose, at most.")] = 100,
     every: Annotated[
@@ -32,15 +32,15 @@ def label(
     from functools import partial
 
     from standoff.cli.console import progress
-    from standoff.simulation.output import whole_folder
-    from standoff.stages.detect import DetectParams, OnnxDetector
+    from standoff.stages.detect import DetectParams, OnnxDetector, find_model
+    from standoff.stages.sinks.whole import whole_folder
     from standoff.training.frame_selection import LabelPlan, SelectionParams, label_frames
     from standoff.training.frame_selection.doubt import LEAST_SCORE
 
     selection = SelectionParams(frames=frames, threshold=_part(threshold), least_gap_s=gap)
     plan = LabelPlan(source, selection, every_s=every, fps=fps, format=layout)
     with whole_folder(out, overwrite=overwrite) as folder:
-        detector = OnnxDetector(model, DetectParams(score_threshold=LEAST_SCORE))
+        detector = OnnxDetector(find_model(model), DetectParams(score_threshold=LEAST_SCORE))
         report = label_frames(plan, detector, folder, partial(progress, quiet=quiet))
     if not quiet:
         _tell(report, out)

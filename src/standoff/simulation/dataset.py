@@ -16,7 +16,6 @@ from standoff.labels.types import Split
 from standoff.simulation.covers import COVER_KINDS
 from standoff.simulation.crew import work_through
 from standoff.simulation.moment import scene_at
-from standoff.simulation.output import whole_folder
 from standoff.simulation.picture_set import Picture, PictureSet, draw_split, is_marked
 from standoff.simulation.presets import MAX_SEED, Condition, CoverPlan, Plan, Preset, check_seed, check_size
 from standoff.simulation.render import Look
@@ -26,6 +25,7 @@ from standoff.simulation.site_plans import SiteStyle
 from standoff.simulation.studio import Studio
 from standoff.simulation.truth import Row
 from standoff.simulation.viewpoints import Obstacles, draw_flight, draw_view
+from standoff.stages.sinks.whole import whole_folder
 
 _SCENE_FRAMES = 240
 _SHUTTERS_S = (0.0, 0.0, 1 / 240, 1 / 100)

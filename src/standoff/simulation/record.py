@@ -21,7 +21,6 @@ from standoff.core.homography import FloatArray
 from standoff.core.pose import View
 from standoff.simulation.coco import Annotations
 from standoff.simulation.crew import work_through
-from standoff.simulation.output import whole_folder
 from standoff.simulation.presets import Plan
 from standoff.simulation.scene import Actor, Reference
 from standoff.simulation.sensor import VideoWriter
@@ -30,6 +29,7 @@ from standoff.simulation.studio import Shot, Studio
 from standoff.simulation.telemetry import ShownSettings, write_telemetry
 from standoff.simulation.truth import FRAMES_SCHEMA, PAIRS_SCHEMA, TRUTH_SCHEMA, Row
 from standoff.stages.ground import save_camera
+from standoff.stages.sinks.whole import whole_folder
 
 FORMAT = 1
 """Of the clip folder; `scene.json` carries it."""

@@ -25,7 +25,6 @@ from standoff.simulation.crew import work_through
 from standoff.simulation.flight import Still
 from standoff.simulation.light import random_light
 from standoff.simulation.moment import Moment, scene_at
-from standoff.simulation.output import whole_folder
 from standoff.simulation.picture_set import Picture, PictureSet, draw_split, is_marked
 from standoff.simulation.presets import Condition, check_seed, check_size
 from standoff.simulation.render import Cutout, Renderer
@@ -34,6 +33,7 @@ from standoff.simulation.sensor import Sensor
 from standoff.simulation.soil_colours import PALETTES
 from standoff.simulation.terrain_plan import Soil
 from standoff.simulation.truth import Row, entity_rows
+from standoff.stages.sinks.whole import whole_folder
 
 _UNTOUCHED_SHARE, _DESERTED_SHARE = 0.05, 0.10
 _SMEARED_SHARE, _LONGEST_SMEAR_PX = 0.2, 6.0

@@ -17,8 +17,8 @@ import onnxruntime
 from standoff.core.errors import ModelError
 from standoff.stages.detect.model_card import INPUT_NAME, OUTPUT_NAME, ModelCard
 from standoff.stages.detect.runtime import open_session
+from standoff.stages.sinks.whole import whole_file
 from standoff.training.quantization.onnx_file import read_own_model
-from standoff.training.whole_file import whole_file
 
 _WEIGHTED = frozenset({"Conv", "ConvTranspose", "Gemm", "MatMul"})
 _LARGEST_BOX_SHIFT = 1e-2

@@ -18,10 +18,10 @@ from standoff.core.errors import DataError, ModelError
 from standoff.labels import LabelledData, LabelledPicture, Split, load_picture
 from standoff.stages.detect.letterbox import Letterbox
 from standoff.stages.frames import frame_from_array
+from standoff.stages.sinks.whole import whole_file
 from standoff.training.quantization.gate import Gate, Loss
 from standoff.training.quantization.int8 import Int8Network, Method, NetworkInput, Recipe
 from standoff.training.quantization.onnx_file import describe_as_made_from, is_quantized, read_own_model
-from standoff.training.whole_file import whole_file
 
 Step = Callable[[], None]
 Progress = Callable[[str, int], AbstractContextManager[Step]]

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from standoff.core.errors import OutputError
-from standoff.simulation.output import whole_folder
+from standoff.stages.sinks.whole import whole_file, whole_folder
 
 
 def test_a_folder_appears_when_the_block_has_ended(tmp_path: Path) -> None:
@@ -52,3 +52,21 @@ def test_a_used_folder_a_file_and_a_forbidden_place_are_refused(tmp_path: Path) 
         whole_folder(tmp_path / "used" / "a.txt" / "b", overwrite=True),
     ):
         pass
+
+
+def test_a_file_that_is_not_finished_leaves_the_older_one_alone(tmp_path: Path) -> None:
+    out = tmp_path / "model.onnx"
+    out.write_text("older")
+    with pytest.raises(ZeroDivisionError), whole_file(out) as half_written:
+        half_written.write_text("half")
+        raise ZeroDivisionError
+    assert out.read_text() == "older"
+    with whole_file(out) as half_written:
+        half_written.write_text("newer")
+    assert out.read_text() == "newer"
+    assert list(tmp_path.iterdir()) == [out]
+
+
+def test_a_file_that_cannot_be_written_is_an_error_in_one_line(tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match="a place to write"), whole_file(tmp_path / "nowhere" / "model.onnx"):
+        pytest.fail("nothing to write to")
