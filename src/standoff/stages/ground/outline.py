@@ -24,6 +24,7 @@ BOX_OUTSIDE = "the reference's box lies outside the picture"
 TOO_FEW_EDGES = "too few edges in the reference's box"
 
 _MIN_EDGES = 16
+_ORIENTED_MARGIN = 0.06
 
 
 class OutlineFinder:
@@ -57,12 +58,13 @@ class OutlineFinder:
         Returns:
             The outline in undistorted pixels, or why there is none that can be believed.
         """
-        if self.params.method == "oriented":
-            margin = self.params.box_margin * float((box_xyxy_px[2:] - box_xyxy_px[:2]).max())
-            box_xyxy_px = box_xyxy_px + np.array([-margin, -margin, margin, margin])
-            found = self._find_oriented(gray, box_xyxy_px)
-        else:
-            found = self._find_by_paper(gray, box_xyxy_px)
+        is_oriented = self.params.method == "oriented"
+        share = self.params.box_margin
+        if share is None:
+            share = _ORIENTED_MARGIN if is_oriented else 0.0
+        margin = share * float((box_xyxy_px[2:] - box_xyxy_px[:2]).max())
+        box_xyxy_px = box_xyxy_px + np.array([-margin, -margin, margin, margin])
+        found = self._find_oriented(gray, box_xyxy_px) if is_oriented else self._find_by_paper(gray, box_xyxy_px)
         if isinstance(found, NoGroundMap):
             return found
         corners_px = found.corners_px if self.camera is None else self.camera.distort(found.corners_px)

@@ -37,13 +37,13 @@ class ReferenceParams:
         float, Interval(ge=0, le=1), Doc("Detections of the reference less sure than this are ignored.")
     ] = 0.3
     box_margin: Annotated[
-        float,
+        float | None,
         Interval(ge=0, le=1),
         Doc(
             "The search goes this share of the box's longer side beyond the box, because detectors cut corners. "
-            "Only `oriented` does; the paper stays inside the box."
+            "None: 0.06 for `oriented`; the others stay inside the box, as the paper does."
         ),
-    ] = 0.06
+    ] = None
     min_side_support: Annotated[
         float,
         Interval(ge=0, le=1),
