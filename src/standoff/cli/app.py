@@ -9,7 +9,21 @@ from typing import Annotated
 import typer
 
 from standoff import __version__
-from standoff.cli import bench, calibrate, config, demo, doctor, evaluate, export, label, quantize, run, simulate, train
+from standoff.cli import (
+    bench,
+    blend,
+    calibrate,
+    config,
+    demo,
+    doctor,
+    evaluate,
+    export,
+    label,
+    quantize,
+    run,
+    simulate,
+    train,
+)
 from standoff.core.errors import StandoffError
 
 app = typer.Typer(
@@ -21,6 +35,7 @@ app = typer.Typer(
 )
 app.command("run")(run.run)
 app.command("train")(train.train)
+app.command("blend")(blend.blend)
 app.command("export")(export.export)
 app.command("quantize")(quantize.quantize)
 app.command("label")(label.label)

@@ -52,8 +52,8 @@ def test_a_run_leaves_all_that_it_takes_to_judge_and_to_use_it(finished: tuple[R
     names = {path.name for path in out.iterdir()}
     assert names == {
         "network.cfg", "classes.names", "run.yaml", "start.json", "checkpoints", "history.json", "table.md",
-        "curves.png", "predictions.jpg", "best.json", "best.weights", "last.weights", "model.onnx", "model-half.onnx",
-        "model-card.md",
+        "curves.png", "predictions.jpg", "best.json", "start.weights", "best.weights", "last.weights", "model.onnx",
+        "model-half.onnx", "model-card.md",
     }  # fmt: skip
     assert [row["step"] for row in heard.rows] == [30, 60, 90]
     assert json.loads((out / "history.json").read_text()) == heard.rows

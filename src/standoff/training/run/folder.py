@@ -60,11 +60,14 @@ class RunFolder:
         """Averaged weights of the last validation."""
         return self.path / "last.weights"
 
-    def write_start(self, cfg_text: str, configuration: dict[str, Any], facts: dict[str, Any]) -> None:
+    def write_start(
+        self, cfg_text: str, network: DarknetNetwork, configuration: dict[str, Any], facts: dict[str, Any]
+    ) -> None:
         """Write what the run is before it begins.
 
         Args:
             cfg_text: Of the network.
+            network: Where the run starts: written as `start.weights`, for `standoff blend`.
             configuration: What repeats the run: written as `run.yaml`.
             facts: About the data and the starting point, for people and records.
 
@@ -77,6 +80,7 @@ class RunFolder:
             self._write("classes.names", "\n".join(self.classes) + "\n")
             self._write("run.yaml", yaml.safe_dump(plain(configuration), sort_keys=False))
             write_json(self.path / "start.json", {"standoff": __version__, **facts})
+            save_weights(network, self.path / "start.weights")
         except OSError as error:
             raise OutputError(
                 expected=f"to write to {self.path}", found=str(error.strerror), fix="choose a folder that is writable"

@@ -126,7 +126,7 @@ def _started(plan: RunPlan, data: LabelledData, folder: RunFolder, listener: Lis
         "transferred": asdict(transferred),
         "backbone_layers": backbone_of(network, transferred),
     }
-    folder.write_start(cfg_text, plan.to_dict(), facts)
+    folder.write_start(cfg_text, network, plan.to_dict(), facts)
     return network, backbone_of(network, transferred)
 
 

@@ -1,0 +1,37 @@
+"""`standoff blend`: one network between several of one architecture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from standoff.core.errors import ConfigError
+
+
+def blend(
+    parts: Annotated[
+        list[str], typer.Argument(help="FILE.weights=SHARE each; the shares add up to 1.", show_default=False)
+    ],
+    cfg: Annotated[Path, typer.Option(help="Darknet .cfg that all of them belong to.", show_default=False)],
+    out: Annotated[Path, typer.Option("--out", "-o", help="Darknet weights to write.", show_default=False)],
+) -> None:
+    """Mix Darknet weights, such as a run's start.weights=0.3 and best.weights=0.7, to keep what the start knew."""
+    from standoff.training.required import require_packages
+
+    require_packages("torch", purpose="blend weights")
+    from standoff.training.start.blend import blend_weights
+
+    blend_weights(cfg, [_part(text) for text in parts], out)
+    typer.echo(f"wrote {out}; make a model of it with: standoff export --cfg {cfg} --weights {out} --names ...")
+
+
+def _part(text: str) -> tuple[Path, float]:
+    name, _, share = text.rpartition("=")
+    try:
+        return Path(name), float(share)
+    except ValueError:
+        raise ConfigError(
+            expected="FILE.weights=SHARE", found=f"'{text}'", fix="write for example best.weights=0.7"
+        ) from None
