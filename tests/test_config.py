@@ -97,7 +97,7 @@ def test_the_detector_is_the_shipped_one_unless_a_file_is_named(
     (tmp_path / "deep").mkdir()
     (tmp_path / "far").mkdir()
     assert load_settings().model == load_settings(overrides={"model": "site"}).model == "site"
-    assert load_settings(write(tmp_path / "deep", "model: site-int8\n")).model == "site-int8"
+    assert load_settings(write(tmp_path / "deep", "model: site\n")).model == "site"
     assert load_settings(overrides={"model": "./site"}).model == tmp_path / "site"
     assert load_settings(write(tmp_path / "far", "model: site.onnx\n")).model == tmp_path / "far" / "site.onnx"
 

@@ -8,10 +8,8 @@ import pytest
 from cli.calling import Call
 from evaluation.paper import drawn_clip
 
-from standoff.core.errors import ModelError
 from standoff.evaluation.paper import Clip, load_clip
 from standoff.evaluation.paper.truth_detector import TrueBoxes
-from standoff.stages.detect import find_model
 
 
 @pytest.fixture(scope="module")
@@ -68,10 +66,6 @@ def test_a_broken_installation_is_one_line(drawn: Clip, tmp_path: Path, call: Ca
 
 
 def test_the_shipped_detector_sees_the_breach_and_the_near_miss(tmp_path: Path, call: Call) -> None:
-    try:
-        find_model("site")
-    except ModelError as absent:
-        pytest.skip(str(absent))
     assert call("demo", "--out", tmp_path / "out", "--json", tmp_path / "found.json")[0] == 0
     found = json.loads((tmp_path / "found.json").read_text())
     assert all(one["recognised"] for one in found["encounters"])

@@ -16,9 +16,7 @@ if TYPE_CHECKING:
 def bench(
     source: Annotated[Path, typer.Argument(help="Video file, or a folder of pictures.", show_default=False)],
     config: Annotated[Path | None, typer.Option(help="Settings, YAML.")] = None,
-    model: Annotated[
-        str | None, typer.Option(help="Detector: site (ours, the default), site-int8 (quicker), or an ONNX file.")
-    ] = None,
+    model: Annotated[str | None, typer.Option(help="Detector: site (ours, the default), or an ONNX file.")] = None,
     frames: Annotated[int, typer.Option(min=2, help="At most so many frames of the source.")] = 200,
     darknet: Annotated[
         str | None, typer.Option(help="CFG,WEIGHTS of the same network: times OpenCV on it beside ONNX Runtime.")

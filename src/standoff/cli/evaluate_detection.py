@@ -30,7 +30,7 @@ def detection(
         ),
     ],
     model: Annotated[
-        list[str], typer.Option(help="Detector: site, site-int8, or ONNX; may be repeated.", show_default=False)
+        list[str], typer.Option(help="Detector: site (ours), or ONNX; may be repeated.", show_default=False)
     ],
     split: Annotated[Split, typer.Option(help="Of labelled pictures.")] = "test",
     slices: Annotated[

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 def label(
     source: Annotated[Path, typer.Argument(help="Video file, or a folder of pictures.", show_default=False)],
-    model: Annotated[str, typer.Option(help="Detector: site, site-int8, or ONNX.", show_default=False)],
+    model: Annotated[str, typer.Option(help="Detector: site (ours), or ONNX.", show_default=False)],
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for pictures and boxes.", show_default=False)],
     frames: Annotated[int, typer.Option(min=1, help="How many to choose, at most.")] = 100,
     every: Annotated[

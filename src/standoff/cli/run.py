@@ -64,9 +64,7 @@ def run(
     source: Annotated[Path, typer.Argument(help="Video file, or a folder of pictures.", show_default=False)],
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the outputs.", show_default=False)],
     config: Annotated[Path | None, typer.Option(help="Settings, YAML (see `standoff config show`).")] = None,
-    model: Annotated[
-        str | None, typer.Option(help="Detector: site (ours, the default), site-int8 (quicker), or an ONNX file.")
-    ] = None,
+    model: Annotated[str | None, typer.Option(help="Detector: site (ours, the default), or an ONNX file.")] = None,
     ground: Annotated[
         str | None,
         typer.Option(help="survey.yaml (surveyed points), square:SIDE (a square reference, side in m), or none."),
