@@ -1,13 +1,36 @@
-"""Out of memory: say which batch would fit, instead of only that this one does not."""
+"""Memory of a run: freed blocks are kept, and where there is too little, advice says which batch would fit."""
 
 from __future__ import annotations
 
+import ctypes
+import sys
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 
 import torch
 
 from standoff.core.errors import ConfigError
+
+_TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3
+"""Of `mallopt`, as in glibc's malloc.h."""
+_NEVER = 2**31 - 1
+
+
+def keep_freed_memory() -> None:
+    """Let glibc keep large blocks that were freed, for the next step, instead of giving each back to the system.
+
+    A step on a CPU takes and frees hundreds of blocks of up to 200 MB. Fresh from the system each, they have to be
+    cleared page by page: EfficientNet-lite0 at 640x384 with 16 pictures took 7.0 s of CPU time a step, and 2.3 s so.
+    Elsewhere than on Linux with glibc nothing happens.
+    """
+    if not sys.platform.startswith("linux"):
+        return
+    try:
+        mallopt = ctypes.CDLL(None).mallopt
+    except AttributeError:  # another C library
+        return
+    for what in (_MMAP_THRESHOLD, _TRIM_THRESHOLD):
+        mallopt(what, _NEVER)
 
 
 def is_out_of_memory(error: BaseException) -> bool:

@@ -21,6 +21,7 @@ from standoff.training.quantization.half_precision import store_half
 from standoff.training.run.card import card_text
 from standoff.training.run.folder import RunFolder, read_run, refuse_used
 from standoff.training.run.loop import Progress, Trainer, Watcher
+from standoff.training.run.memory import keep_freed_memory
 from standoff.training.run.params import TrainParams
 from standoff.training.start.starting_point import backbone_of, compose_cfg, fill_network
 
@@ -77,6 +78,7 @@ def train_detector(plan: RunPlan, out: Path, listener: Listener, *, resumes: boo
     Raises:
         DataError, ConfigError, ModelError, OutputError: See the parts.
     """
+    keep_freed_memory()
     if not resumes:
         refuse_used(out)
     data = read_data(plan.data)
