@@ -141,6 +141,18 @@ def test_problems_of_the_data_are_counted_and_named_once_a_kind(tmp_path: Path) 
     assert sum(message.startswith("3 times ") and labels[0].stem in message for message in heard.messages) == 1
 
 
+def test_a_held_out_picture_that_is_also_trained_on_is_reported(tmp_path: Path) -> None:
+    plan = _plan(tmp_path, steps=4, warmup_steps=1, validate_every=4)
+    rng = np.random.default_rng(3)
+    blotches = cv2.resize(rng.integers(0, 255, (6, 8, 3)).astype(np.uint8), (128, 96), interpolation=cv2.INTER_CUBIC)
+    for split, name in (("train", "twice_1"), ("val", "copy_1")):
+        cv2.imwrite(str(plan.data / "images" / split / f"{name}.png"), blotches)
+        (plan.data / "labels" / split / f"{name}.txt").write_text("")
+    heard = _Heard()
+    train_detector(plan, tmp_path / "run", heard.listener())
+    assert sum("copy_1.png (val) like twice_1.png" in message for message in heard.messages) == 1
+
+
 def test_an_unknown_architecture_is_answered_with_the_known_ones(tmp_path: Path) -> None:
     plan = _plan(tmp_path)
     with pytest.raises(ConfigError, match="yolov3-tiny"):

@@ -11,6 +11,7 @@ from typing import Any
 from standoff.core.errors import ConfigError
 from standoff.evaluation.detection import DetectionScore
 from standoff.labels import LabelledData, Problem, read_data
+from standoff.labels.near_duplicates import near_duplicates
 from standoff.labels.summary import summarise
 from standoff.stages.detect.model_card import file_sha256
 from standoff.stages.sinks.json_text import plain
@@ -84,6 +85,8 @@ def train_detector(plan: RunPlan, out: Path, listener: Listener, *, resumes: boo
     data = read_data(plan.data)
     _report_problems(data, listener)
     folder = RunFolder(out, data.classes)
+    if not resumes:
+        _report_near_duplicates(data, listener)
     network, backbone_layers = _resumed(folder) if resumes else _started(plan, data, folder, listener)
     trainer = Trainer(network, data, plan.params, folder.checkpoints, plan.params.backbone_layers or backbone_layers)
     if resumes:
@@ -151,6 +154,17 @@ def _report_problems(data: LabelledData, listener: Listener) -> None:
     for kind, problems in kinds.items():
         example = problems[0]
         listener.on_message(f"{len(problems)} times {kind}, first {example.path}: {example.found}")
+
+
+def _report_near_duplicates(data: LabelledData, listener: Listener) -> None:
+    """Warn of held-out pictures that look like training ones: their figures would say nothing about new sites."""
+    found = near_duplicates(data)
+    if found:
+        first = found[0]
+        listener.on_message(
+            f"{len(found)} held-out pictures look like one to train on, first {first.held_out.name} ({first.split}) "
+            f"like {first.train.name}: split by scene, flight or video, or figures will be too good"
+        )
 
 
 __all__ = ["Listener", "RunPlan", "read_run", "train_detector"]
