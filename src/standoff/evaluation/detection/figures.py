@@ -16,8 +16,8 @@ from standoff.evaluation.detection.comparison import Comparison
 from standoff.evaluation.detection.score import PRECISION, ClassScore
 from standoff.stages.sinks.folder import partial_path
 
-_COLOURS = ("#1f5f8b", "#c0562f", "#3a7d44", "#7a4fa3", "#b38600", "#2b8f8f", "#a33a5b", "#5b5b5b")
-_INK, _QUIET, _GRID = "#222222", "#6b6b6b", "#ececec"
+SERIES_COLOURS = ("#1f5f8b", "#c0562f", "#3a7d44", "#7a4fa3", "#b38600", "#2b8f8f", "#a33a5b", "#5b5b5b")
+INK, QUIET, GRID = "#222222", "#6b6b6b", "#ececec"
 _PANEL_IN = (3.4, 3.3)
 _MOST_COLUMNS = 4
 _LEAST_WIDTH_IN = 5.0
@@ -66,18 +66,18 @@ def _draw_curves(comparison: Comparison) -> Figure:
         _draw_class(axes, comparison, name)
     for axes in panels[len(names) :]:
         axes.set_visible(False)
-    figure.suptitle(f"Precision against recall on {comparison.material}", fontsize=11, x=0.01, ha="left", color=_INK)
+    figure.suptitle(f"Precision against recall on {comparison.material}", fontsize=11, x=0.01, ha="left", color=INK)
     return figure
 
 
 def _draw_class(axes: Axes, comparison: Comparison, name: str) -> None:
-    axes.axhline(PRECISION, color=_QUIET, linewidth=0.7, linestyle=(0, (4, 3)))
+    axes.axhline(PRECISION, color=QUIET, linewidth=0.7, linestyle=(0, (4, 3)))
     scores = [result.score.of(name) for result in comparison.results]
     for row, one in enumerate(scores):
         axes.plot(one.curve.recall, one.curve.precision, color=_colour(row), linewidth=1.6, solid_joinstyle="round")
         axes.plot(one.recall, one.precision, "o", color=_colour(row), markersize=5, markeredgecolor="white")
     _name_curves(axes, [f"{result.candidate.label}  " for result in comparison.results], scores)
-    axes.set_title(f"{name.replace('_', ' ')}, {scores[0].truths:,} to find", fontsize=9.5, loc="left", color=_INK)
+    axes.set_title(f"{name.replace('_', ' ')}, {scores[0].truths:,} to find", fontsize=9.5, loc="left", color=INK)
     axes.set(xlim=(0.0, 1.0), ylim=(0.0, 1.02), xlabel="recall", ylabel="precision")
     _tidy(axes)
 
@@ -115,7 +115,7 @@ def _draw_accuracy_against_time(comparison: Comparison) -> Figure:
     axes.set(xlabel="milliseconds a picture, median", ylabel="mean AP, 11 points (Eq. 1)")
     _label_points(axes, comparison, times_ms, accuracy)
     note = ", bars: 95 % over scenes" if comparison.chance else ""
-    axes.set_title(f"Accuracy against time on {comparison.material}{note}", fontsize=11, loc="left", color=_INK)
+    axes.set_title(f"Accuracy against time on {comparison.material}{note}", fontsize=11, loc="left", color=INK)
     _tidy(axes)
     return figure
 
@@ -145,14 +145,14 @@ def _blank(width_in: float, height_in: float) -> Figure:
 
 
 def _colour(row: int) -> str:
-    return _COLOURS[row % len(_COLOURS)]
+    return SERIES_COLOURS[row % len(SERIES_COLOURS)]
 
 
 def _tidy(axes: Axes) -> None:
     axes.spines[["top", "right"]].set_visible(False)
-    axes.spines[["left", "bottom"]].set_color(_QUIET)
-    axes.grid(color=_GRID, linewidth=0.8)
+    axes.spines[["left", "bottom"]].set_color(QUIET)
+    axes.grid(color=GRID, linewidth=0.8)
     axes.set_axisbelow(True)
-    axes.tick_params(labelsize=8, colors=_QUIET)
+    axes.tick_params(labelsize=8, colors=QUIET)
     axes.xaxis.label.set_fontsize(8.5)
     axes.yaxis.label.set_fontsize(8.5)

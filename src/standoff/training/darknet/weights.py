@@ -16,7 +16,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from standoff.core.errors import ModelError, OutputError
+from standoff.core.errors import ModelError
+from standoff.stages.sinks.whole import whole_file
 from standoff.training.darknet.network import ConvolutionBlock, DarknetNetwork
 
 Numbers: TypeAlias = np.ndarray[tuple[int], np.dtype[np.float32]]
@@ -195,20 +196,10 @@ def save_weights(
         OutputError: The file cannot be written.
     """
     header = header or WeightsHeader()
-    half_written = path.with_name(f".{path.name}.part")
-    try:
-        with half_written.open("wb") as file:
-            file.write(struct.pack("<iii", header.major, header.minor, header.revision))
-            file.write(struct.pack(header.seen_format, header.seen))
-            for index, block in network.convolutions():
-                if cut_after_layer is None or index <= cut_after_layer:
-                    for parameter in _parameters(block):
-                        file.write(parameter.detach().cpu().numpy().astype("<f4").tobytes())
-        half_written.replace(path)
-    except OSError as error:
-        half_written.unlink(missing_ok=True)
-        raise OutputError(
-            expected=f"a place to write {path}",
-            found=error.strerror or type(error).__name__,
-            fix="choose a file in an existing folder that you may write to",
-        ) from error
+    with whole_file(path) as half_written, half_written.open("wb") as file:
+        file.write(struct.pack("<iii", header.major, header.minor, header.revision))
+        file.write(struct.pack(header.seen_format, header.seen))
+        for index, block in network.convolutions():
+            if cut_after_layer is None or index <= cut_after_layer:
+                for parameter in _parameters(block):
+                    file.write(parameter.detach().cpu().numpy().astype("<f4").tobytes())

@@ -6,7 +6,8 @@ from typing import Any
 
 import yaml
 
-from standoff.labels import SPLITS, LabelledData, Split
+from standoff.labels import LabelledData, Split
+from standoff.labels.summary import SplitSummary, summarise
 from standoff.stages.sinks.json_text import plain
 from standoff.training.run.loop import Progress
 from standoff.training.run.tables import markdown_table
@@ -20,7 +21,7 @@ def card_text(configuration: dict[str, Any], data: LabelledData, progress: Progr
         data: What it was trained on.
         progress: How it went.
     """
-    counts = "\n".join(_count(data, split) for split in SPLITS)
+    counts = "\n".join(_row(split, summary) for split, summary in summarise(data).splits.items())
     return f"""# Detector trained with standoff
 
 Classes: {", ".join(data.classes)}.
@@ -51,11 +52,6 @@ How the detector does on sites, seasons, machines and cameras that the data does
 """
 
 
-def _count(data: LabelledData, split: Split) -> str:
-    pictures = data.splits[split]
-    groups = {(picture.source, picture.group) for picture in pictures}
-    marked = [
-        str(sum(int((picture.class_id[~picture.ignored] == index).sum()) for picture in pictures))
-        for index in range(len(data.classes))
-    ]
-    return f"| {split} | {len(pictures)} | {len(groups)} | " + " | ".join(marked) + " |"
+def _row(split: Split, summary: SplitSummary) -> str:
+    marked = " | ".join(map(str, summary.boxes.values()))
+    return f"| {split} | {summary.pictures} | {len(summary.groups)} | {marked} |"

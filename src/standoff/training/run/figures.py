@@ -12,11 +12,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from standoff.core.types import Detections, ImageArray
+from standoff.evaluation.detection.figures import GRID, INK, QUIET, SERIES_COLOURS
 from standoff.labels import LabelledPicture, load_picture
 from standoff.stages.detect.letterbox import resize
 
-_INK, _QUIET, _GRID = "#222222", "#6b6b6b", "#ececec"
-_COLOURS: Final = ("#1f5f8b", "#c0562f", "#3a7d44", "#7a4fa3", "#b38600", "#2b8f8f", "#a33a5b", "#5b5b5b")
 _LOSSES: Final = {"loss_total": "total", "loss_objectness": "objectness", "loss_box": "box", "loss_classes": "classes"}
 _CELL_WIDTH_PX, _COLUMNS = 800, 2
 _SURE = 0.3
@@ -34,21 +33,21 @@ def draw_curves(rows: Sequence[dict[str, Any]], classes: Sequence[str], path: Pa
     figure = Figure(figsize=(12.0, 4.8), dpi=130, layout="constrained", facecolor="white")
     losses, accuracy = figure.subplots(1, 2)
     steps = [row["step"] for row in rows]
-    for colour, (name, label) in zip(_COLOURS, _LOSSES.items(), strict=False):
+    for colour, (name, label) in zip(SERIES_COLOURS, _LOSSES.items(), strict=False):
         _line(losses, steps, [row[name] for row in rows], label, colour, width=2.0 if label == "total" else 1.2)
     losses.set(yscale="log", title="Loss on training pictures", xlabel="step")
     for index, name in enumerate(classes):
-        colour = _COLOURS[(index + 1) % len(_COLOURS)]
+        colour = SERIES_COLOURS[(index + 1) % len(SERIES_COLOURS)]
         values = [100.0 * row[f"ap_{name}"] for row in rows]
         if np.isfinite(values).any():
             _line(accuracy, steps, values, name.replace("_", " "), colour, width=1.0)
-    _line(accuracy, steps, [100.0 * row["map"] for row in rows], "mAP", _INK, width=2.4)
-    _line(accuracy, steps, [100.0 * row["average_iou"] for row in rows], "average IoU", _QUIET, width=1.6)
+    _line(accuracy, steps, [100.0 * row["map"] for row in rows], "mAP", INK, width=2.4)
+    _line(accuracy, steps, [100.0 * row["average_iou"] for row in rows], "average IoU", QUIET, width=1.6)
     accuracy.set(ylim=(0, 100), title="11-point AP and average IoU on validation pictures, %", xlabel="step")
     accuracy.legend(loc="lower right", fontsize=8, frameon=False, ncols=2)
     losses.legend(loc="upper right", fontsize=8, frameon=False)
     for axes in (losses, accuracy):
-        axes.grid(color=_GRID)
+        axes.grid(color=GRID)
         axes.spines[["top", "right"]].set_visible(False)
     figure.savefig(path, format="png")
 
@@ -87,7 +86,7 @@ def _draw_cell(picture: LabelledPicture, found: Detections, classes: Sequence[st
     for box, score, class_id in zip(found.xyxy_px, found.score, found.class_id, strict=True):
         if score < _SURE:
             continue
-        colour = _bgr(_COLOURS[int(class_id) % len(_COLOURS)])
+        colour = _bgr(SERIES_COLOURS[int(class_id) % len(SERIES_COLOURS)])
         left, top = _rectangle(cell, box * scale, colour)
         label = f"{classes[int(class_id)].replace('_', ' ')} {score:.2f}"
         cv2.putText(cell, label, (left, max(10, top - 3)), cv2.FONT_HERSHEY_SIMPLEX, 0.38, (0, 0, 0), 3, cv2.LINE_AA)

@@ -76,9 +76,9 @@ class RunFolder:
         """
         try:
             self.path.mkdir(parents=True, exist_ok=True)
-            self._write("network.cfg", cfg_text)
-            self._write("classes.names", "\n".join(self.classes) + "\n")
-            self._write("run.yaml", yaml.safe_dump(plain(configuration), sort_keys=False))
+            self._write_text("network.cfg", cfg_text)
+            self._write_text("classes.names", "\n".join(self.classes) + "\n")
+            self._write_text("run.yaml", yaml.safe_dump(plain(configuration), sort_keys=False))
             write_json(self.path / "start.json", {"standoff": __version__, **facts})
             save_weights(network, self.path / "start.weights")
         except OSError as error:
@@ -114,14 +114,14 @@ class RunFolder:
         header = WeightsHeader(seen=pictures_seen)
         save_weights(network, self.last_weights, header)
         write_json(self.path / "history.json", progress.rows)
-        self._write("table.md", markdown_table(progress.rows, self.classes))
-        self._write_figure("curves.png", lambda path: draw_curves(progress.rows, self.classes, path))
+        self._write_text("table.md", markdown_table(progress.rows, self.classes))
+        self._write("curves.png", lambda path: draw_curves(progress.rows, self.classes, path))
         if progress.best_step == progress.step:
             save_weights(network, self.best_weights, header)
             write_json(self.path / "best.json", {"step": progress.step, **score.to_dict()})
             shown = pictures[:: max(1, len(pictures) // _SHOWN_PICTURES)][:_SHOWN_PICTURES]
             readable, found = detect_pictures(network, shown, bf16=False)
-            self._write_figure("predictions.jpg", lambda path: draw_predictions(readable, found, self.classes, path))
+            self._write("predictions.jpg", lambda path: draw_predictions(readable, found, self.classes, path))
 
     def write_model(self, half: Callable[[Path, Path], None]) -> Path:
         """Export the best weights as ONNX, in single and in half precision storage.
@@ -139,16 +139,14 @@ class RunFolder:
 
     def write_card(self, text: str) -> None:
         """Write the model card."""
-        self._write("model-card.md", text)
+        self._write_text("model-card.md", text)
 
-    def _write(self, name: str, text: str) -> None:
-        partial = partial_path(self.path / name)
-        partial.write_text(text, encoding="utf-8")
-        partial.replace(self.path / name)
+    def _write_text(self, name: str, text: str) -> None:
+        self._write(name, lambda path: path.write_text(text, encoding="utf-8"))
 
-    def _write_figure(self, name: str, draw: Callable[[Path], None]) -> None:
+    def _write(self, name: str, write: Callable[[Path], object]) -> None:
         partial = partial_path(self.path / name)
-        draw(partial)
+        write(partial)
         partial.replace(self.path / name)
 
 

@@ -13,6 +13,7 @@ from standoff.core.types import Detections
 from standoff.evaluation.detection import DetectionScore, score_detections
 from standoff.labels import LabelledPicture, load_picture
 from standoff.stages.detect.letterbox import Letterbox, resize
+from standoff.stages.detect.outputs import read_rows as read_candidates
 from standoff.stages.detect.suppression import suppress
 from standoff.training.darknet.network import DarknetNetwork, DecodedNetwork
 
@@ -59,13 +60,11 @@ def detect_pictures(
 
 def read_rows(rows: npt.NDArray[np.float32], letterbox: Letterbox) -> Detections:
     """Turn (N, 5 + classes) rows of a decoded network into boxes of the picture, without duplicates."""
-    rows = rows[rows[:, 4] >= _LEAST_SCORE]
     rows = rows[np.argsort(-rows[:, 4], kind="stable")[:_MOST_ROWS]]
-    scores = rows[:, 5:] * rows[:, 4:5]
-    class_id = scores.argmax(axis=1) if len(scores) else np.empty(0, np.int64)
-    score = scores[np.arange(len(scores)), class_id].astype(np.float64)
-    centre, half = rows[:, 0:2].astype(np.float64), rows[:, 2:4].astype(np.float64) / 2.0
-    xyxy_px = letterbox.to_source(np.concatenate([centre - half, centre + half], axis=1))
+    candidates = read_candidates([rows[None]], _LEAST_SCORE)
+    xyxy_px = letterbox.to_source(candidates.xyxy_px)
+    class_id = candidates.probability.argmax(axis=1)
+    score = candidates.probability.max(axis=1).astype(np.float64)
     wanted = (score >= _LEAST_SCORE) & (xyxy_px[:, 2:] > xyxy_px[:, :2]).all(axis=1)
     return suppress(Detections(xyxy_px, score, class_id)[wanted], _NMS_IOU, _MOST_DETECTIONS)
 
