@@ -1,6 +1,9 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -180,3 +183,42 @@ def test_the_card_says_how_to_repeat_the_run(finished: tuple[RunPlan, Path, _Hea
     card = (out / "model-card.md").read_text()
     repeated = yaml.safe_load(card.split("```yaml\n")[1].split("```")[0])
     assert repeated == plan.to_dict()
+
+
+def test_a_half_model_that_is_refused_does_not_end_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(model_in: Path, model_out: Path) -> None:
+        raise ModelError(
+            expected=f"small shifts from {model_in.name}", found="large ones", fix=f"drop {model_out.name}"
+        )
+
+    monkeypatch.setattr("standoff.training.run.folder.store_half", refuse)
+    plan, heard = _plan(tmp_path, steps=4, warmup_steps=1, validate_every=4), _Heard()
+    train_detector(plan, tmp_path / "run", heard.listener())
+    assert {"model.onnx", "model-card.md"} <= {path.name for path in (tmp_path / "run").iterdir()}
+    assert sum("no model-half.onnx" in message and "large ones" in message for message in heard.messages) == 1
+
+
+_CREW_SCRIPT = """
+import os, sys, torch
+from pathlib import Path
+from training.run.test_run import _Heard
+from training.small_runs import small_params
+from standoff.training.run.train import RunPlan, train_detector
+torch.set_num_threads(1)
+data, cfg, out = map(Path, sys.argv[1:])
+plan = RunPlan(data, str(cfg), None, small_params(steps=4, validate_every=4))
+train_detector(plan, out, _Heard().listener())
+"""
+
+
+def test_one_of_several_processes_writes_the_folder(tmp_path: Path) -> None:
+    plan = _plan(tmp_path)
+    script = tmp_path / "crew.py"
+    script.write_text(_CREW_SCRIPT)
+    tests = Path(__file__).parents[2]
+    path = f"{tests}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"
+    launch = [sys.executable, "-m", "torch.distributed.run", "--standalone", "--nproc-per-node=2", str(script)]
+    arguments = [str(plan.data), plan.arch, str(tmp_path / "run")]
+    environment = {**os.environ, "PYTHONPATH": path, "OMP_NUM_THREADS": "1"}
+    subprocess.run([*launch, *arguments], check=True, env=environment, capture_output=True)
+    assert (tmp_path / "run" / "model.onnx").is_file()

@@ -19,6 +19,7 @@ from standoff.stages.sinks.json_text import plain, write_json
 from standoff.training.darknet.export import export_darknet
 from standoff.training.darknet.network import DarknetNetwork
 from standoff.training.darknet.weights import WeightsHeader, save_weights
+from standoff.training.quantization.half_precision import store_half
 from standoff.training.run.figures import draw_curves, draw_predictions
 from standoff.training.run.loop import Progress
 from standoff.training.run.tables import markdown_table
@@ -123,19 +124,17 @@ class RunFolder:
             readable, found = detect_pictures(network, shown, bf16=False)
             self._write("predictions.jpg", lambda path: draw_predictions(readable, found, self.classes, path))
 
-    def write_model(self, half: Callable[[Path, Path], None]) -> Path:
-        """Export the best weights as ONNX, in single and in half precision storage.
+    def write_model(self) -> None:
+        """Export the best weights as ONNX."""
+        export_darknet(self.cfg, self.best_weights, self.path / "classes.names", None, self.path / "model.onnx")
 
-        Args:
-            half: Stores a model's weights in half precision.
+    def write_half_model(self) -> None:
+        """Store the exported model's weights in half precision.
 
-        Returns:
-            The single precision file.
+        Raises:
+            ModelError: That would move boxes too far.
         """
-        model = self.path / "model.onnx"
-        export_darknet(self.cfg, self.best_weights, self.path / "classes.names", None, model)
-        half(model, self.path / "model-half.onnx")
-        return model
+        store_half(self.path / "model.onnx", self.path / "model-half.onnx")
 
     def write_card(self, text: str) -> None:
         """Write the model card."""

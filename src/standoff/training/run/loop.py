@@ -107,11 +107,6 @@ class Trainer:
         self._validation = spread(data.splits["val"], params.validate_pictures)
         self.progress = Progress()
 
-    @property
-    def leads(self) -> bool:
-        """Whether this process is the one that writes."""
-        return self._crew.leads
-
     def resume(self) -> tuple[str, ...]:
         """Go on from the newest checkpoint that is whole.
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
-from standoff.core.errors import ConfigError
+from standoff.core.errors import ConfigError, ModelError
 from standoff.evaluation.detection import DetectionScore
 from standoff.labels import LabelledData, Problem, read_data
 from standoff.labels.near_duplicates import near_duplicates
@@ -18,8 +18,8 @@ from standoff.stages.sinks.json_text import plain
 from standoff.training.darknet.cfg import parse_cfg, read_cfg
 from standoff.training.darknet.network import DarknetNetwork
 from standoff.training.darknet.shapes import check_input
-from standoff.training.quantization.half_precision import store_half
 from standoff.training.run.card import card_text
+from standoff.training.run.distributed import Crew
 from standoff.training.run.folder import RunFolder, read_run, refuse_used
 from standoff.training.run.loop import Progress, Trainer, Watcher
 from standoff.training.run.memory import keep_freed_memory
@@ -80,14 +80,13 @@ def train_detector(plan: RunPlan, out: Path, listener: Listener, *, resumes: boo
         DataError, ConfigError, ModelError, OutputError: See the parts.
     """
     keep_freed_memory()
-    if not resumes:
+    leads = Crew.join().leads
+    if leads and not resumes:
         refuse_used(out)
     data = read_data(plan.data)
     _report_problems(data, listener)
     folder = RunFolder(out, data.classes)
-    if not resumes:
-        _report_near_duplicates(data, listener)
-    network, backbone_layers = _resumed(folder) if resumes else _started(plan, data, folder, listener)
+    network, backbone_layers = _resumed(folder) if resumes else _started(plan, data, folder, listener, leads=leads)
     trainer = Trainer(network, data, plan.params, folder.checkpoints, plan.params.backbone_layers or backbone_layers)
     if resumes:
         for name in trainer.resume():
@@ -110,13 +109,28 @@ def train_detector(plan: RunPlan, out: Path, listener: Listener, *, resumes: boo
         listener.on_step(step, loss, (step - first) / (monotonic() - started_s))
 
     progress = trainer.run(Watcher(on_step, on_validation, on_bad_picture))
-    if trainer.leads:
-        folder.write_model(store_half)
-        folder.write_card(card_text(plan.to_dict(), data, progress))
+    if leads:
+        _write_results(plan, data, folder, progress, listener)
     return progress
 
 
-def _started(plan: RunPlan, data: LabelledData, folder: RunFolder, listener: Listener) -> tuple[DarknetNetwork, int]:
+def _write_results(
+    plan: RunPlan, data: LabelledData, folder: RunFolder, progress: Progress, listener: Listener
+) -> None:
+    folder.write_card(card_text(plan.to_dict(), data, progress))
+    folder.write_model()
+    try:
+        folder.write_half_model()
+    except ModelError as refusal:
+        # The run has been paid for, and its model is there in single precision.
+        listener.on_message(f"no model-half.onnx: {refusal}")
+
+
+def _started(
+    plan: RunPlan, data: LabelledData, folder: RunFolder, listener: Listener, *, leads: bool
+) -> tuple[DarknetNetwork, int]:
+    if leads:
+        _report_near_duplicates(data, listener)
     cfg_text = compose_cfg(plan.arch, data, plan.params)
     cfg = parse_cfg(cfg_text, "network.cfg")
     check_input(cfg)
@@ -131,7 +145,8 @@ def _started(plan: RunPlan, data: LabelledData, folder: RunFolder, listener: Lis
         "transferred": asdict(transferred),
         "backbone_layers": backbone_of(network, transferred),
     }
-    folder.write_start(cfg_text, network, plan.to_dict(), facts)
+    if leads:
+        folder.write_start(cfg_text, network, plan.to_dict(), facts)
     return network, backbone_of(network, transferred)
 
 
