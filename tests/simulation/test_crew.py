@@ -9,7 +9,7 @@ from functools import partial
 import pytest
 
 from standoff.core.errors import DataError, SimulationError
-from standoff.simulation.crew import work_through
+from standoff.simulation.crew import _Hand, work_through
 
 
 @contextmanager
@@ -38,3 +38,25 @@ def test_an_error_in_a_worker_reaches_the_caller_as_it_was(processes: int) -> No
 def test_a_killed_process_is_an_error_and_not_a_wait_for_ever() -> None:
     with pytest.raises(SimulationError, match="killed"):
         list(work_through(partial(_squares, kill_at=5), range(9), processes=2))
+
+
+def test_a_job_for_a_process_that_has_failed_does_not_hide_why_it_failed() -> None:
+    with _Hand(partial(_squares, stop_at=4), 2) as hand:
+        for job in (3, 4):
+            hand.give(job)
+        hand._process.join()
+        hand.give(5)
+        assert hand.take() == 9
+        with pytest.raises(DataError, match="found job 4"):
+            hand.take()
+
+
+def test_a_job_for_a_process_that_was_killed_does_not_hide_that_it_was() -> None:
+    with _Hand(partial(_squares, kill_at=4), 2) as hand:
+        for job in (3, 4):
+            hand.give(job)
+        hand._process.join()
+        hand.give(5)
+        assert hand.take() == 9
+        with pytest.raises(SimulationError, match="killed"):
+            hand.take()

@@ -9,7 +9,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 from collections.abc import Callable, Generator, Sequence
-from contextlib import AbstractContextManager, ExitStack
+from contextlib import AbstractContextManager, ExitStack, suppress
 from multiprocessing.connection import Connection
 from typing import Generic, TypeVar
 
@@ -73,10 +73,9 @@ class _Hand(Generic[Job, Result]):
         self._line.close()
 
     def give(self, job: Job) -> None:
-        try:
+        # A process that has ended takes no more jobs; why it ended is in the line, and `take` finds it there.
+        with suppress(OSError):
             self._line.send(job)
-        except OSError as error:
-            raise _lost() from error
 
     def take(self) -> Result:
         try:
