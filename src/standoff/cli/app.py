@@ -18,6 +18,7 @@ from standoff.cli import (
     doctor,
     evaluate,
     export,
+    join,
     label,
     quantize,
     run,
@@ -36,6 +37,7 @@ app = typer.Typer(
 app.command("run")(run.run)
 app.command("train")(train.train)
 app.command("blend")(blend.blend)
+app.command("join")(join.join)
 app.command("export")(export.export)
 app.command("quantize")(quantize.quantize)
 app.command("label")(label.label)

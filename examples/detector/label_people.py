@@ -1,0 +1,56 @@
+"""Divide the photographs of vehicles: streets in which people are marked, too, and flights in which they are not.
+
+    python label_people.py SHARED/aerial_vehicles people.yaml unlabelled.yaml DATA
+
+writes DATA/streets and DATA/flights as YOLO sets of links to the photographs. `people.yaml` holds, by photograph, boxes of
+people (proposed by a detector, then sorted by eye) and regions in which somebody may be, in pixels; `unlabelled.yaml` what
+moves in the other photographs and has no label.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import cv2
+import yaml
+
+NAMES = ("car", "truck", "bus", "minibus", "cyclist", "person")
+
+
+def main() -> None:
+    """Write both sets."""
+    source, marks, moving, out = (Path(argument) for argument in sys.argv[1:])
+    marked = yaml.safe_load(marks.read_text())
+    for name in ("streets", "flights"):
+        for kind in ("images", "labels"):
+            (out / name / kind).mkdir(parents=True, exist_ok=True)
+        (out / name / "classes.txt").write_text("\n".join(NAMES) + "\n")
+    for picture in sorted((source / "images").iterdir()):
+        people = marked.get(picture.stem)
+        folder = out / ("flights" if people is None else "streets")
+        link = folder / "images" / picture.name
+        link.unlink(missing_ok=True)
+        link.symlink_to(picture.resolve())
+        rows = (source / "labels" / f"{picture.stem}.txt").read_text().splitlines()
+        if people is not None:
+            height_px, width_px = cv2.imread(str(picture)).shape[:2]
+            rows += [_row(box, width_px, height_px) for box in people["people"]]
+        (folder / "labels" / f"{picture.stem}.txt").write_text("\n".join(rows) + "\n")
+    unknown = {
+        "streets": {stem: people["unknown"] for stem, people in marked.items()},
+        "flights": {stem: boxes for stem, boxes in yaml.safe_load(moving.read_text()).items() if stem not in marked},
+    }
+    for name, regions in unknown.items():
+        (out / name / "ignore.yaml").write_text(yaml.safe_dump(regions))
+
+
+def _row(box: list[float], width_px: int, height_px: int) -> str:
+    left, top, right, bottom = box
+    sides = ((left + right) / 2 / width_px, (top + bottom) / 2 / height_px)
+    sides += ((right - left) / width_px, (bottom - top) / height_px)
+    return " ".join([str(NAMES.index("person")), *(f"{side:.6f}" for side in sides)])
+
+
+if __name__ == "__main__":
+    main()

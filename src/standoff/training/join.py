@@ -1,0 +1,140 @@
+"""Join detectors into one: several networks in one ONNX file, each answering for the classes that it knows best.
+
+A network that learnt machines from rendered sites and one that still knows real people make one detector that knows
+both. Each sees the same input; their boxes are put one after another, and the suppression of overlapping boxes of one
+class, which follows every detector, merges what both have found. The time a picture takes is the sum of theirs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import onnx
+
+from standoff.core.errors import ConfigError, ModelError
+from standoff.stages.detect.model_card import INPUT_NAME, OUTPUT_NAME, ModelCard, file_sha256
+from standoff.stages.sinks.whole import whole_file
+from standoff.training.quantization.onnx_file import read_own_model
+
+_BOX_COLUMNS = 5
+"""Centre, sides and objectness, before the classes."""
+
+_Floats = npt.NDArray[np.float32]
+_Model = tuple[onnx.ModelProto, ModelCard]
+
+
+def join_models(parts: Sequence[tuple[Path, Sequence[str]]], out: Path) -> ModelCard:
+    """Join detectors of the same classes and input size.
+
+    Args:
+        parts: Each file, made by `standoff export` or `standoff train`, and the classes that it answers for; none
+            given: all.
+        out: The ONNX file; appears only when complete, and replaces an older one.
+
+    Returns:
+        What the file says about itself.
+
+    Raises:
+        ConfigError: There are fewer than two parts, a part does not know a class, or nobody answers for one.
+        ModelError: A part is no such model, or differs in its classes, input size or operators from the first.
+        OutputError: The file cannot be written.
+    """
+    if len(parts) < 2:
+        raise ConfigError(
+            expected="two models or more to join",
+            found=str(len(parts)),
+            fix="write for example machines.onnx=excavator,vehicle people.onnx=worker",
+        )
+    read = [read_own_model(path) for path, _ in parts]
+    for (path, _), other in zip(parts[1:], read[1:], strict=True):
+        _check_alike(parts[0][0], path, (read[0], other))
+    models, cards = [model for model, _ in read], [card for _, card in read]
+    classes = cards[0].classes
+    shares = [_answers_for(path, named, classes) for path, named in parts]
+    silent = [name for name, heard in zip(classes, np.max(shares, axis=0), strict=True) if not heard]
+    if silent:
+        raise ConfigError(
+            expected="a model that answers for each class",
+            found=f"none for {', '.join(silent)}",
+            fix="name the class after one of the models, or name none to take all of its classes",
+        )
+    card = ModelCard(
+        classes=classes,
+        anchors_px=tuple(anchors for card in cards for anchors in card.anchors_px),
+        input_size_px=cards[0].input_size_px,
+        # Runs call their models alike: the folder tells them apart.
+        sources={f"{path.resolve().parent.name}/{path.name}": file_sha256(path) for path, _ in parts},
+    )
+    joined = _joined(models, shares)
+    onnx.helper.set_model_props(joined, card.to_metadata())
+    with whole_file(out) as path:
+        onnx.save(joined, str(path))
+    return card
+
+
+def _check_alike(first: Path, other: Path, read: tuple[_Model, _Model]) -> None:
+    (model_a, card_a), (model_b, card_b) = read
+    for what, wanted, found in (
+        ("classes", card_a.classes, card_b.classes),
+        ("input size", card_a.input_size_px, card_b.input_size_px),
+        ("operators", _operators(model_a), _operators(model_b)),
+    ):
+        if wanted != found:
+            raise ModelError(
+                expected=f"the {what} of {first.name}, {_text(wanted)}, in {other.name}",
+                found=_text(found),
+                fix="export both with the same classes and --size, with one version of standoff",
+            )
+
+
+def _operators(model: onnx.ModelProto) -> tuple[str, ...]:
+    return tuple(sorted(f"{entry.domain or 'onnx'} {entry.version}" for entry in model.opset_import))
+
+
+def _text(values: tuple[object, ...]) -> str:
+    return ", ".join(str(value) for value in values)
+
+
+def _answers_for(
+    path: Path, named: Sequence[str], classes: tuple[str, ...]
+) -> np.ndarray[tuple[int], np.dtype[np.float32]]:
+    """Return (C,) 1 for classes that a part answers for, 0 for the others."""
+    unknown = [name for name in named if name not in classes]
+    if unknown:
+        raise ConfigError(
+            expected=f"classes of {path.name}: {', '.join(classes)}",
+            found=", ".join(unknown),
+            fix="name only those",
+        )
+    return np.array([not named or name in named for name in classes], dtype=np.float32)
+
+
+def _joined(models: Sequence[onnx.ModelProto], shares: Sequence[_Floats]) -> onnx.ModelProto:
+    """Return one graph of all: one input, and the rows of the outputs one after another."""
+    nodes: list[onnx.NodeProto] = []
+    tensors: list[onnx.TensorProto] = []
+    outputs: list[str] = []
+    for index, (model, share) in enumerate(zip(models, shares, strict=True)):
+        prefix = f"part{index}_"
+        graph = onnx.compose.add_prefix_graph(model.graph, prefix)
+        for node in graph.node:
+            node.input[:] = [INPUT_NAME if name == prefix + INPUT_NAME else name for name in node.input]
+        nodes += graph.node
+        tensors += graph.initializer
+        boxes = prefix + OUTPUT_NAME
+        if not share.all():
+            kept = np.concatenate([np.ones(_BOX_COLUMNS, np.float32), share]).reshape(1, 1, -1)
+            tensors.append(onnx.numpy_helper.from_array(kept, f"{prefix}kept"))
+            nodes.append(onnx.helper.make_node("Mul", [boxes, f"{prefix}kept"], [f"{boxes}_kept"]))
+            boxes += "_kept"
+        outputs.append(boxes)
+    nodes.append(onnx.helper.make_node("Concat", outputs, [OUTPUT_NAME], axis=1))
+    first = models[0].graph
+    rows = sum(model.graph.output[0].type.tensor_type.shape.dim[1].dim_value for model in models)
+    columns = first.output[0].type.tensor_type.shape.dim[2].dim_value
+    result = onnx.helper.make_tensor_value_info(OUTPUT_NAME, onnx.TensorProto.FLOAT, [1, rows, columns])
+    graph = onnx.helper.make_graph(nodes, "joined", list(first.input), [result], tensors)
+    return onnx.helper.make_model(graph, opset_imports=models[0].opset_import, ir_version=models[0].ir_version)
