@@ -14,8 +14,7 @@ from training.drawn_pictures import SIZE_PX, draw_boxes, draw_ellipses, label, t
 from standoff.core.errors import DataError
 from standoff.core.types import ImageArray
 from standoff.labels import LabelledPicture
-from standoff.stages.detect.letterbox import Letterbox, resize
-from standoff.training.pictures.augment import AugmentParams, Sample, make_sample, plain_sample
+from standoff.training.pictures.augment import AugmentParams, Sample, make_sample
 
 CLEAN = replace(AugmentParams(), shadows=0.0, colour=0.0, blur=0.0, lost_detail=0.0, noise=0.0, jpeg=0.0, cut_out=0.0)
 """Nothing but views and mosaics."""
@@ -116,18 +115,6 @@ def test_a_folder_of_unreadable_pictures_is_an_error() -> None:
     data = _drawn(0)
     with pytest.raises(DataError, match=r"in a row that cannot, the last .*png"):
         make_sample(np.random.default_rng(0), data, _uniform(data), load, _SIZE_PX, AugmentParams())
-
-
-@pytest.mark.parametrize("size_px", [(320, 192), (200, 416), (1000, 600)])
-def test_a_plain_sample_is_what_the_detector_sees(size_px: tuple[int, int]) -> None:
-    picture = label(draw_boxes(np.random.default_rng(1)))
-    image = draw_ellipses(picture.xyxy_px)
-    sample = plain_sample(picture, image, size_px)
-    box = Letterbox.fit(picture.size_px, size_px)
-    seen = box.network_input(resize(image, box.inner_size_px))[0]
-    # The fill is 127.5 there and 128 here.
-    np.testing.assert_allclose(sample.image[..., ::-1].transpose(2, 0, 1) / 255.0, seen, atol=0.51 / 255.0)
-    np.testing.assert_allclose(box.to_source(sample.xyxy_px), picture.xyxy_px, rtol=GEOMETRY_REL)
 
 
 def test_chances_and_ranges_that_make_no_sense_are_refused() -> None:

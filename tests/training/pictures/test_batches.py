@@ -14,7 +14,7 @@ from training.drawn_pictures import draw_boxes, draw_ellipses, label
 
 from standoff.core.errors import DataError
 from standoff.labels import LabelledPicture
-from standoff.training.pictures.augment import AugmentParams, plain_sample
+from standoff.training.pictures.augment import AugmentParams, Sample
 from standoff.training.pictures.batches import Batch, draw_chances, open_batches, stack_samples
 
 _TENSORS = ("pictures", "boxes", "class_id", "ignored", "picture")
@@ -87,9 +87,8 @@ def test_a_batch_has_the_size_of_its_step_and_boxes_that_know_their_picture(draw
 def test_samples_are_stacked_red_first_with_their_boxes(drawn: list[LabelledPicture]) -> None:
     samples = []
     for number, picture in enumerate(drawn[:3]):
-        few = replace(picture, **{name: getattr(picture, name)[:number] for name in ("xyxy_px", "class_id", "ignored")})
-        image = np.full((360, 640, 3), (10, 20, 200), np.uint8)
-        samples.append(plain_sample(few, image, (160, 90)))
+        image = np.full((90, 160, 3), (10, 20, 200), np.uint8)
+        samples.append(Sample(image, picture.xyxy_px[:number], picture.class_id[:number], picture.ignored[:number]))
     batch = stack_samples(samples)
     assert batch.pictures[1, :, 40, 80].tolist() == [200, 20, 10]
     assert batch.picture.tolist() == [1, 2, 2]

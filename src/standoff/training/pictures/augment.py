@@ -12,13 +12,12 @@ from standoff.core.errors import DataError
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import ImageArray, IntArray
 from standoff.labels.types import LabelledPicture
-from standoff.stages.detect.letterbox import Letterbox, resize
 from standoff.training.pictures.augment_params import AugmentParams
 from standoff.training.pictures.cut_outs import hide_parts
 from standoff.training.pictures.degrade import degrade
-from standoff.training.pictures.views import GREY, View, cut_boxes, draw_view
+from standoff.training.pictures.views import cut_boxes, draw_view
 
-__all__ = ["AugmentParams", "Sample", "make_sample", "plain_sample"]
+__all__ = ["AugmentParams", "Sample", "make_sample"]
 
 Pick = Callable[[np.random.Generator], int]
 """Draws the position of a picture."""
@@ -80,23 +79,6 @@ def make_sample(
         ignored |= hide_parts(rng, image, xyxy_px, params)
     class_id = np.concatenate([part.class_id for part in parts])
     return Sample(degrade(rng, image, params), xyxy_px, class_id, ignored)
-
-
-def plain_sample(picture: LabelledPicture, image: ImageArray, size_px: tuple[int, int]) -> Sample:
-    """Show a whole picture as the detector sees it in use.
-
-    Args:
-        picture: What is marked in it; nothing is left out.
-        image: (H, W, 3) its pixels, blue first.
-        size_px: (width, height) of the network's input.
-    """
-    box = Letterbox.fit(picture.size_px, size_px)
-    (width, height), (left, top) = box.inner_size_px, box.offset_px
-    filled = np.full((size_px[1], size_px[0], 3), GREY, np.uint8)
-    filled[top : top + height, left : left + width] = resize(image, box.inner_size_px)
-    scale = np.array(box.inner_size_px) / np.array(picture.size_px)
-    view = View(np.column_stack([np.diag(scale), [left, top]]), picture.size_px, size_px)
-    return Sample(filled, view.carry(picture.xyxy_px), picture.class_id, picture.ignored)
 
 
 def _cells(
