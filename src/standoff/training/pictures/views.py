@@ -14,7 +14,7 @@ from standoff.core.types import ImageArray
 from standoff.labels.types import LabelledPicture
 from standoff.training.pictures.augment_params import AugmentParams
 
-_GREY: Final = 128
+GREY: Final = 128
 """Where there is no picture, as `stages.detect` fills its letterbox."""
 _OFF_CENTRE: Final = 0.45
 """What a view is aimed at lies at most this far from its middle, as a part of its sides: not cut by its border."""
@@ -50,7 +50,7 @@ class View:
         matrix = self.source_to_view.copy()
         matrix[:, :2] *= enlarged
         matrix[:, 2] += matrix[:, :2].sum(axis=1) * 0.5 - 0.5
-        fill = (_GREY, _GREY, _GREY)
+        fill = (GREY, GREY, GREY)
         onto[:] = cv2.warpAffine(image, matrix, self.size_px, flags=cv2.INTER_LINEAR, borderValue=fill)
 
     def carry(self, xyxy_px: FloatArray) -> FloatArray:
