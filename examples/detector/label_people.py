@@ -34,8 +34,10 @@ def main() -> None:
         link.symlink_to(picture.resolve())
         rows = (source / "labels" / f"{picture.stem}.txt").read_text().splitlines()
         if people is not None:
-            height_px, width_px = cv2.imread(str(picture)).shape[:2]
-            rows += [_row(box, width_px, height_px) for box in people["people"]]
+            image = cv2.imread(str(picture))
+            if image is None:
+                sys.exit(f"cannot read {picture}")
+            rows += [_row(box, image.shape[1], image.shape[0]) for box in people["people"]]
         (folder / "labels" / f"{picture.stem}.txt").write_text("\n".join(rows) + "\n")
     unknown = {
         "streets": {stem: people["unknown"] for stem, people in marked.items()},
@@ -47,8 +49,8 @@ def main() -> None:
 
 def _row(box: list[float], width_px: int, height_px: int) -> str:
     left, top, right, bottom = box
-    sides = ((left + right) / 2 / width_px, (top + bottom) / 2 / height_px)
-    sides += ((right - left) / width_px, (bottom - top) / height_px)
+    across, down = (left + right) / 2 / width_px, (top + bottom) / 2 / height_px
+    sides = (across, down, (right - left) / width_px, (bottom - top) / height_px)
     return " ".join([str(NAMES.index("person")), *(f"{side:.6f}" for side in sides)])
 
 

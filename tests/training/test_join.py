@@ -33,7 +33,7 @@ def write_models(folder: Path, *seeds: int, size_px: tuple[int, int] | None = No
 
 def _rows(model: Path, picture: np.ndarray) -> np.ndarray:
     session = onnxruntime.InferenceSession(str(model), providers=["CPUExecutionProvider"])
-    return session.run(None, {INPUT_NAME: picture})[0]
+    return np.asarray(session.run(None, {INPUT_NAME: picture})[0])
 
 
 @pytest.mark.parametrize("seed", range(3))
