@@ -2,9 +2,9 @@
 
     python label_people.py SHARED/aerial_vehicles people.yaml unlabelled.yaml DATA
 
-writes DATA/streets and DATA/flights as YOLO sets of links to the photographs. `people.yaml` holds, by photograph, boxes of
-people (proposed by a detector, then sorted by eye) and regions in which somebody may be, in pixels; `unlabelled.yaml` what
-moves in the other photographs and has no label.
+writes DATA/streets and DATA/flights as YOLO sets of links to the photographs. `people.yaml` holds, by photograph, boxes
+of people (proposed by a detector, then sorted by eye) and regions in which somebody may be, in pixels;
+`unlabelled.yaml` what moves in the other photographs and has no label.
 """
 
 from __future__ import annotations
