@@ -98,6 +98,6 @@ def test_a_data_set_appears(opengl: None, call: Call, tmp_path: Path, layout: st
 
 def test_a_folder_with_files_is_kept(call: Call, tmp_path: Path) -> None:
     (tmp_path / "mine.txt").write_text("keep")
-    code, _, err = call(*_SET, "--out", tmp_path)
-    assert code == 2 and _is_one_line(err) and "--overwrite" in err
+    code, _, err = call(*_SET, "--out", tmp_path, "--overwrite")
+    assert code == 2 and _is_one_line(err) and "mine.txt" in err
     assert (tmp_path / "mine.txt").read_text() == "keep"

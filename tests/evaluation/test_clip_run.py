@@ -2,6 +2,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from standoff.core.errors import DataError
 from standoff.core.homography import FloatArray
 from standoff.core.protocols import Detector
 from standoff.core.types import Detections, Frame
-from standoff.evaluation.clip_run import ClipScore, ClipWitness
+from standoff.evaluation.clip_run import ClipScore, ClipWitness, Encounter
 from standoff.evaluation.paper import Clip, load_clip
 from standoff.evaluation.paper.truth_detector import TrueBoxes
 from standoff.monitor import open_run
@@ -127,6 +128,29 @@ def test_the_score_is_plain_json_types(clip: Clip, tmp_path: Path, monkeypatch: 
     figures = score_of(clip, settings, MovedBoxes(clip), tmp_path / "run", monkeypatch).to_dict()
     assert [one["recognised"] for one in figures["encounters"]] == [True, True]
     assert {group["class_pair"] for group in figures["pairs"]} == {"worker-excavator", "worker-wheel_loader"}
+
+
+@pytest.mark.parametrize(
+    ("said", "said_s", "recognised"),
+    [("danger", 2.9, True), ("danger", 3.1, False), ("warning", 2.0, False), ("", np.nan, False)],
+)
+def test_an_encounter_is_recognised_while_it_lasts(
+    said: Literal["danger", "warning", ""], said_s: float, recognised: bool
+) -> None:
+    assert Encounter("breach", ("worker", "excavator"), 1.0, 3.0, -0.5, said, said_s).recognised == recognised
+
+
+def test_a_run_that_was_stopped_early_says_so(clip: Clip, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    settings = settings_with(clip, loader_radius_m=8.0, excavator_radius_m=6.5)
+    monkeypatch.setattr("standoff.config.build.find_model", lambda model: model)
+    monkeypatch.setattr("standoff.config.build.OnnxDetector", lambda path, params: MovedBoxes(clip))
+    run = open_run(clip.video, tmp_path / "run", settings)
+    witness = ClipWitness(clip, settings, run.source.size_px)
+    seen_all = []
+    for result in run:
+        seen_all.append(witness.has_seen_all)
+        witness.take(result)
+    assert not any(seen_all) and witness.has_seen_all
 
 
 def test_settings_without_a_reference_object_are_refused(clip: Clip) -> None:

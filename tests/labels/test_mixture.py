@@ -13,7 +13,7 @@ from standoff.core.classes import CLASSES
 from standoff.core.errors import DataError
 from standoff.labels import read_data
 from standoff.labels.site_classes import to_site_classes
-from standoff.labels.splits import hold_out
+from standoff.labels.splits import hold_out, require_splits
 from standoff.labels.summary import summarise
 from standoff.labels.types import SPLITS, Split
 
@@ -238,3 +238,16 @@ def test_the_summary_counts_everything_once(tmp_path: Path) -> None:
     assert (sum(one.empty for one in splits), sum(one.ignored for one in splits)) == (1, 1)
     assert all(one.sources == {"f": one.pictures} and sum(one.groups.values()) == one.pictures for one in splits)
     assert summary.problems == {"unreadable labels": 1}
+
+
+def test_pictures_of_one_scene_alone_are_told_so_when_there_is_nothing_to_hold_out(tmp_path: Path) -> None:
+    alone = read_data(_flights(tmp_path / "alone", flights=1))
+    with pytest.raises(
+        DataError, match=r"all pictures are of one scene \(flighta\)\. Add another video, or give `group`"
+    ):
+        require_splits(alone, ("train", "val"))
+    require_splits(alone, ("train",))
+    require_splits(read_data(_flights(tmp_path / "many")), ("train", "val"))
+    path = write_mixture(tmp_path / "mix.yaml", {"path": "many", "split": "train"})
+    with pytest.raises(DataError, match="found none in val"):
+        require_splits(read_data(path), ("train", "val"))

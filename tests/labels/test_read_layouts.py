@@ -135,6 +135,22 @@ def test_a_coco_folder_has_crowds_scenes_and_a_file_for_each_split(tmp_path: Pat
     assert picture.group == f"{tmp_path.name}/1"
 
 
+@pytest.mark.parametrize(
+    ("file", "folder"),
+    [
+        ("instances_train2017.json", "train2017"),
+        ("instances_train2017.json", "images/train2017"),
+        ("instances_default.json", "images/default"),
+        ("instances_default.json", "images"),
+    ],
+)
+def test_pictures_of_a_coco_file_are_found_where_coco_and_cvat_put_them(tmp_path: Path, file: str, folder: str) -> None:
+    write_picture(tmp_path / folder / "1.png")
+    boxes = [{"image_id": 1, "category_id": 7, "bbox": [1, 1, 5, 5]}]
+    _coco(tmp_path / "annotations" / file, [{"id": 1, "file_name": "1.png"}], boxes)
+    assert by_stem(read_data(tmp_path))["1"].path == tmp_path / folder / "1.png"
+
+
 def test_damaged_entries_of_a_coco_file_cost_their_own_picture_only(tmp_path: Path) -> None:
     for number in [*range(12), 20, 21, 22]:
         write_picture(tmp_path / f"{number}.png")

@@ -13,13 +13,13 @@ from standoff.simulation.crew import _Hand, work_through
 
 
 @contextmanager
-def _squares(stop_at: int = -1, kill_at: int = -1) -> Generator[Callable[[int], int], None, None]:
+def _squares(stop_at: int = -1, kill_at: int = -1, divide_at: int = -1) -> Generator[Callable[[int], int], None, None]:
     def square(job: int) -> int:
         if job == stop_at:
             raise DataError(expected="a job", found=f"job {job}", fix="skip it")
         if job == kill_at:
             os.kill(os.getpid(), signal.SIGKILL)
-        return job * job
+        return job * job // (job != divide_at)
 
     yield square
 
@@ -60,3 +60,8 @@ def test_a_job_for_a_process_that_was_killed_does_not_hide_that_it_was() -> None
         assert hand.take() == 9
         with pytest.raises(SimulationError, match="killed"):
             hand.take()
+
+
+def test_an_error_that_is_not_ours_is_told_as_what_it_is() -> None:
+    with pytest.raises(SimulationError, match="ZeroDivisionError: "):
+        list(work_through(partial(_squares, divide_at=1), [0, 1, 2], processes=2))

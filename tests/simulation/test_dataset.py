@@ -138,10 +138,10 @@ def test_an_interrupted_run_leaves_nothing(opengl: None, tmp_path: Path) -> None
     assert list(tmp_path.iterdir()) == []
 
 
-def test_files_are_not_overwritten_unless_asked(tmp_path: Path) -> None:
+def test_files_of_others_are_never_overwritten(tmp_path: Path) -> None:
     (tmp_path / "mine.txt").write_text("keep")
-    with pytest.raises(OutputError, match="overwrite"):
-        record_dataset(_PLAN, tmp_path)
+    with pytest.raises(OutputError, match=r"mine\.txt"):
+        record_dataset(_PLAN, tmp_path, overwrite=True)
     assert (tmp_path / "mine.txt").read_text() == "keep"
 
 

@@ -9,7 +9,7 @@ import pytest
 from square_detector import SIZE_PX, draw_squares, write_detector
 from training.start.test_blend import write_weights
 
-from standoff.core.errors import ConfigError, ModelError
+from standoff.core.errors import ConfigError, ModelError, StandoffError
 from standoff.stages.detect import OnnxDetector
 from standoff.stages.detect.model_card import INPUT_NAME, ModelCard, file_sha256
 from standoff.stages.frames import frame_from_array
@@ -40,18 +40,18 @@ def _rows(model: Path, picture: np.ndarray) -> np.ndarray:
 def test_rows_are_those_of_the_parts_without_the_classes_they_do_not_answer_for(tmp_path: Path, seed: int) -> None:
     first, second, third = write_models(tmp_path, 1, 2, 3)
     out = tmp_path / "joined.onnx"
-    join_models([(first, ()), (second, ("worker",)), (third, ("vehicle",))], out)
+    join_models([(first, {}), (second, {"worker": 1.0}), (third, {"all": 1.0, "worker": 0.5})], out)
     onnx.checker.check_model(onnx.load(str(out)), full_check=True)
     picture = np.random.default_rng(seed).random((1, 3, 64, 96), dtype=np.float32)
     expected = [_rows(model, picture) for model in (first, second, third)]
     expected[1][..., 6] = 0
-    expected[2][..., 5] = 0
+    expected[2][..., 5] *= np.float32(0.5)
     np.testing.assert_array_equal(_rows(out, picture), np.concatenate(expected, axis=1))
 
 
 def test_the_card_names_every_part(tmp_path: Path) -> None:
     models = write_models(tmp_path, 1, 2)
-    card = join_models([(models[0], ()), (models[1], ("worker",))], tmp_path / "joined.onnx")
+    card = join_models([(models[0], {}), (models[1], {"worker": 1.0})], tmp_path / "joined.onnx")
     metadata = {entry.key: entry.value for entry in onnx.load(str(tmp_path / "joined.onnx")).metadata_props}
     assert ModelCard.from_metadata(metadata, "joined.onnx") == card
     assert card.classes == CLASSES and len(card.anchors_px) == 2
@@ -60,7 +60,7 @@ def test_the_card_names_every_part(tmp_path: Path) -> None:
 
 def test_a_detector_joined_with_itself_finds_what_it_found_alone(tmp_path: Path) -> None:
     alone = write_detector(tmp_path, half=True)
-    join_models([(alone, ("worker",)), (alone, ("vehicle",))], tmp_path / "joined.onnx")
+    join_models([(alone, {"worker": 1.0}), (alone, {"vehicle": 1.0})], tmp_path / "joined.onnx")
     for seed in range(3):
         frame = frame_from_array(draw_squares(np.random.default_rng(seed), 6)[0])
         expected, found = (OnnxDetector(path).detect(frame) for path in (alone, tmp_path / "joined.onnx"))
@@ -74,14 +74,16 @@ def test_parts_that_do_not_fit_are_refused_and_nothing_is_written(tmp_path: Path
     (larger,) = write_models(tmp_path, 3, size_px=(192, 128))
     other = write_detector(tmp_path)
     out = tmp_path / "joined.onnx"
-    for parts, error, match in (
-        ([(first, ())], ConfigError, "two models or more"),
-        ([(first, ()), (second, ("crane",))], ConfigError, "crane"),
-        ([(first, ("worker",)), (second, ("worker",))], ConfigError, "none for vehicle"),
-        ([(first, ()), (larger, ())], ModelError, "input size of model.onnx, 96, 64"),
-        ([(first, ()), (other, ())], ModelError, f"{SIZE_PX[0]}, {SIZE_PX[1]}"),
-        ([(first, ()), (tmp_path / "two.names", ())], ModelError, "two.names"),
-    ):
+    wrong: list[tuple[list[tuple[Path, dict[str, float]]], type[StandoffError], str]] = [
+        ([(first, {})], ConfigError, "two models or more"),
+        ([(first, {}), (second, {"crane": 1.0})], ConfigError, "crane"),
+        ([(first, {}), (second, {"worker": 1.5})], ConfigError, "worker:1.5"),
+        ([(first, {"worker": 1.0}), (second, {"worker": 1.0})], ConfigError, "none for vehicle"),
+        ([(first, {}), (larger, {})], ModelError, "input size of model.onnx, 96, 64"),
+        ([(first, {}), (other, {})], ModelError, f"{SIZE_PX[0]}, {SIZE_PX[1]}"),
+        ([(first, {}), (tmp_path / "two.names", {})], ModelError, "two.names"),
+    ]
+    for parts, error, match in wrong:
         with pytest.raises(error, match=match):
             join_models(parts, out)
     assert not out.exists()

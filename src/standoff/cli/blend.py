@@ -24,7 +24,8 @@ def blend(
     from standoff.training.start.blend import blend_weights
 
     blend_weights(cfg, [_part(text) for text in parts], out)
-    typer.echo(f"wrote {out}; make a model of it with: standoff export --cfg {cfg} --weights {out} --names ...")
+    command = f"standoff export --cfg {cfg} --weights {out} --names ... --out ..."
+    typer.echo(f"wrote {out}; make a model of it with: {command}")
 
 
 def _part(text: str) -> tuple[Path, float]:

@@ -33,7 +33,9 @@ def write_json(data: object, path: Path) -> None:
         write_json_file(path, data)
     except OSError as error:
         raise OutputError(
-            expected=f"to write {path}", found=str(error.strerror), fix="choose a file in a folder that is writable"
+            expected=f"to write {path}",
+            found=error.strerror or str(error),
+            fix="choose a file in a folder that is writable",
         ) from error
 
 

@@ -48,6 +48,9 @@ def demo(
     witness = ClipWitness(clip, settings, run.source.size_px)
     watch(run, quiet=quiet, on_result=witness.take)
     tell(out / RECORD, as_json=False, quiet=quiet)
+    if not witness.has_seen_all:
+        typer.echo("The film was not seen to its end: no comparison with its truth.", err=True)
+        raise typer.Exit(exit_status(out / RECORD))
     score = witness.score()
     if json_file is not None:
         write_json(score.to_dict(), json_file)

@@ -43,7 +43,7 @@ def detection(
     video: Annotated[Path | None, typer.Option(help="That a CSV of boxes (frame,id,x,y,w,h,conf,X,Y) is of.")] = None,
     frames: Annotated[str | None, typer.Option(help="Of a CSV of boxes, score these frames only, FIRST-LAST.")] = None,
     at: Annotated[
-        list[float] | None, typer.Option(min=0, max=1, help="Also say precision and recall at this score.")
+        list[float] | None, typer.Option(min=0.005, max=1, help="Also say precision and recall at this score.")
     ] = None,
     iou: Annotated[
         float, typer.Option(min=0.05, max=1, help="Least overlap of a right detection; COCO's figures have their own.")
@@ -69,12 +69,13 @@ def detection(
     candidates = _candidates([find_model(name) for name in model], slices or ["1x1"])
     material = open_material(data, split=split, video=video, frames=frame_range(frames), limit=limit)
     comparison = _compare(candidates, material, grouping, iou, at or [])
+    # First what cannot fail: a mistyped path must not cost an hour of inference.
+    if str(json_file) != "-":
+        print_comparison(comparison, as_markdown=markdown)
     if json_file is not None:
         write_json(comparison.to_dict(), json_file)
     if figure is not None:
         write_figures(comparison, figure)
-    if str(json_file) != "-":
-        print_comparison(comparison, as_markdown=markdown)
 
 
 def _candidates(models: Sequence[Path], slices: Sequence[str]) -> list[Candidate]:
@@ -88,15 +89,30 @@ def _candidates(models: Sequence[Path], slices: Sequence[str]) -> list[Candidate
     if min(min(grid) for grid in grids) < 1:
         raise ConfigError(expected=expected, found="0 slices", fix=f"write for example {example}")
     grids = grids * len(models) if len(grids) == 1 else grids
+    names = _names(models)
     labels = [
-        path.stem + ("" if grid == (1, 1) else f" {grid[0]}x{grid[1]}")
-        for path, grid in zip(models, grids, strict=True)
+        name + ("" if grid == (1, 1) else f" {grid[0]}x{grid[1]}") for name, grid in zip(names, grids, strict=True)
     ]
-    doubled = {label for label, count in Counter(labels).items() if count > 1}
-    return [
-        Candidate(f"{path.parent.name}/{label}" if label in doubled else label, path, grid)
-        for label, path, grid in zip(labels, models, grids, strict=True)
-    ]
+    doubled = sorted(label for label, count in Counter(labels).items() if count > 1)
+    if doubled:
+        raise ConfigError(
+            expected="each --model once with the same --slices",
+            found=f"{doubled[0]} {labels.count(doubled[0])} times",
+            fix="leave the others out",
+        )
+    return [Candidate(label, path, grid) for label, path, grid in zip(labels, models, grids, strict=True)]
+
+
+def _names(models: Sequence[Path]) -> list[str]:
+    """Return the stem of each model, with as many folders before it as tell it from the other files."""
+    parts = [path.resolve().with_suffix("").parts for path in models]
+    different = set(parts)
+    names = []
+    for own in parts:
+        others = different - {own}
+        length = next(n for n in range(1, len(own) + 1) if all(other[-n:] != own[-n:] for other in others))
+        names.append("/".join(own[-length:]))
+    return names
 
 
 def _compare(

@@ -7,11 +7,15 @@ from typing import Annotated
 
 import typer
 
+from standoff.core.errors import ConfigError
+
 
 def join(
     parts: Annotated[
         list[str],
-        typer.Argument(help="FILE.onnx, or FILE.onnx=CLASS,... for those classes alone.", show_default=False),
+        typer.Argument(
+            help="FILE.onnx, or FILE.onnx=CLASS[:FACTOR],... for these classes; all: the rest.", show_default=False
+        ),
     ],
     out: Annotated[Path, typer.Option("--out", "-o", help="ONNX file to write.", show_default=False)],
 ) -> None:
@@ -25,6 +29,14 @@ def join(
     typer.echo(f"wrote {out} ({out.stat().st_size / 1e6:.1f} MB)")
 
 
-def _part(text: str) -> tuple[Path, tuple[str, ...]]:
-    name, _, classes = text.partition("=")
-    return Path(name), tuple(part.strip() for part in classes.split(",") if part.strip())
+def _part(text: str) -> tuple[Path, dict[str, float]]:
+    file, _, classes = text.partition("=")
+    return Path(file), dict(_class(part.strip()) for part in classes.split(",") if part.strip())
+
+
+def _class(text: str) -> tuple[str, float]:
+    name, _, factor = text.partition(":")
+    try:
+        return name, float(factor or 1)
+    except ValueError:
+        raise ConfigError(expected="CLASS or CLASS:FACTOR", found=f"'{text}'", fix="write worker:0.5") from None

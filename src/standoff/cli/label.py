@@ -34,13 +34,13 @@ def label(
     from standoff.cli.console import progress
     from standoff.stages.detect import DetectParams, OnnxDetector, find_model
     from standoff.stages.sinks.whole import whole_folder
-    from standoff.training.frame_selection import LabelPlan, SelectionParams, label_frames
+    from standoff.training.frame_selection import LABEL_FILES, LabelPlan, SelectionParams, label_frames
     from standoff.training.frame_selection.doubt import LEAST_SCORE
 
     selection = SelectionParams(frames=frames, threshold=_part(threshold), least_gap_s=gap)
     plan = LabelPlan(source, selection, every_s=every, fps=fps, format=layout)
-    with whole_folder(out, overwrite=overwrite) as folder:
-        detector = OnnxDetector(find_model(model), DetectParams(score_threshold=LEAST_SCORE))
+    with whole_folder(out, overwrite=overwrite, own=LABEL_FILES) as folder:
+        detector = OnnxDetector(find_model(model), DetectParams(score_threshold=min(threshold, LEAST_SCORE)))
         report = label_frames(plan, detector, folder, partial(progress, quiet=quiet))
     if not quiet:
         _tell(report, out)

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from standoff.training.run.train import RunPlan
 
 _PLAN_KEYS = ("data", "arch", "weights", "train")
+_ADVICE = "correct them; `standoff train --show-settings` lists every train setting of a plan that is right"
 
 
 def train(
@@ -24,7 +25,10 @@ def train(
     ] = None,
     arch: Annotated[
         str | None,
-        typer.Option(help="yolov3, yolov3-tiny, yolo-fastest-xl, efficientnet-lite0, or a Darknet .cfg."),
+        typer.Option(
+            help="yolov3, yolov3-tiny, yolo-fastest-xl, yolo-fastest-xl-8-16, yolo-fastest-xl-8-16-32, "
+            "efficientnet-lite0, or a Darknet .cfg."
+        ),
     ] = None,
     weights: Annotated[
         Path | None, typer.Option(help="Darknet weights to start from, whole or cut at a layer. Absent: from scratch.")
@@ -47,17 +51,22 @@ def train(
 
     require_packages("torch", "onnx", purpose="train a detector")
     from standoff.cli.console import progress_bar
+    from standoff.training.run.distributed import Crew
     from standoff.training.run.train import Listener, read_run, train_detector
 
-    given = {} if config is None else _read_plan(config)
     if resume:
-        given = read_run(out)
+        _refuse_changes({"--config": config, "--arch": arch, "--weights": weights})
+        given, origin = read_run(out), f"{out}/run.yaml and the command line"
+    else:
+        given = {} if config is None else _read_plan(config)
+        origin = str(config) if config else "the command line"
     _override(given, {"data": data, "arch": arch, "weights": weights}, settings or [])
-    plan = _make_plan(given, str(config) if config else "the command line")
+    plan = _make_plan(given, origin)
     if show:
         typer.echo(yaml.safe_dump(plan.to_dict(), sort_keys=False), nl=False)
         return
-    with progress_bar(quiet=quiet, unit="steps") as bar:
+    leads = Crew.join().leads
+    with progress_bar(quiet=quiet or not leads, unit="steps") as bar:
         task = bar.add_task("training", total=plan.params.steps, rate=0.0)
 
         def on_step(step: int, loss: float, rate: float) -> None:
@@ -69,8 +78,20 @@ def train(
 
         listener = Listener(lambda line: bar.console.print(line, highlight=False, soft_wrap=True), on_step, on_row)
         progress = train_detector(plan, out, listener, resumes=resume)
+    if not leads:
+        return
     typer.echo(f"best mAP {100 * progress.best_map:.2f} % at step {progress.best_step}: {out}/model.onnx, best.weights")
     typer.echo(f"look at {out}/model-card.md, curves.png and predictions.jpg")
+
+
+def _refuse_changes(given: dict[str, object]) -> None:
+    changed = [name for name, value in given.items() if value is not None]
+    if changed:
+        raise ConfigError(
+            expected="--resume with no other plan than that of the run",
+            found=" and ".join(changed),
+            fix="leave it out, or start a new run with another --out",
+        )
 
 
 def _read_plan(path: Path) -> dict[str, Any]:
@@ -85,10 +106,14 @@ def _read_plan(path: Path) -> dict[str, Any]:
         )
     for name in ("data", "weights"):
         if plan.get(name) is not None:
-            plan[name] = path.parent / Path(os.path.expandvars(str(plan[name]))).expanduser()
+            plan[name] = _resolve(plan[name], path.parent)
     if str(plan.get("arch", "")).endswith(".cfg"):
-        plan["arch"] = str(path.parent / plan["arch"])
+        plan["arch"] = str(_resolve(plan["arch"], path.parent))
     return plan
+
+
+def _resolve(text: object, folder: Path) -> Path:
+    return folder / Path(os.path.expandvars(str(text))).expanduser()
 
 
 def _override(given: dict[str, Any], named: dict[str, Any], settings: list[str]) -> None:
@@ -99,11 +124,25 @@ def _override(given: dict[str, Any], named: dict[str, Any], settings: list[str])
             raise ConfigError(
                 expected="--set NAME=VALUE", found=f"'{setting}'", fix="write for example --set steps=5000"
             )
-        section = given.setdefault("train", {})
-        *outer, last = name.split(".")
+        section = given
+        *outer, last = ("train", *name.split("."))
         for one in outer:
-            section = section.setdefault(one, {})
-        section[last] = yaml.safe_load(text)
+            section[one] = _section(section.get(one), one)
+            section = section[one]
+        try:
+            section[last] = yaml.safe_load(text)
+        except yaml.YAMLError as error:
+            raise ConfigError(
+                expected="a value as YAML has it after --set NAME=", found=f"'{setting}'", fix="check its brackets"
+            ) from error
+
+
+def _section(value: object, name: str) -> dict[str, Any]:
+    if not isinstance(value, dict | None):
+        raise ConfigError(
+            expected=f"settings by name in `{name}`", found=repr(value), fix="write `name: value` lines below it"
+        )
+    return value or {}
 
 
 def _make_plan(given: dict[str, Any], origin: str) -> RunPlan:
@@ -120,5 +159,5 @@ def _make_plan(given: dict[str, Any], origin: str) -> RunPlan:
         data=Path(given["data"]),
         arch=str(given.get("arch") or "yolo-fastest-xl"),
         weights=None if weights is None else Path(weights),
-        params=read_params(TrainParams, given.get("train") or {}, origin),
+        params=read_params(TrainParams, _section(given.get("train"), "train"), origin, _ADVICE),
     )

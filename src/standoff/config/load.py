@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import yaml
 from pydantic import ValidationError
@@ -25,14 +25,17 @@ def _clause(error: ErrorDetails) -> str:
     return f"{where}: {message}{found}" if where else message
 
 
-def config_error(origin: str, error: ValidationError) -> ConfigError:
+_ADVICE: Final = "correct them; `standoff config show` lists every setting with its meaning and bounds"
+
+
+def config_error(origin: str, error: ValidationError, advice: str = _ADVICE) -> ConfigError:
     """Return what is wrong with settings, in one line; at most three mistakes in full."""
     clauses = [_clause(one) for one in error.errors()]
     more = f"; and {len(clauses) - 3} more" if len(clauses) > 3 else ""
     return ConfigError(
         expected=f"valid settings in {origin}",
         found="; ".join(clauses[:3]) + more,
-        fix="correct them; `standoff config show` lists every setting with its meaning and bounds",
+        fix=advice,
     )
 
 

@@ -12,13 +12,14 @@ from standoff.config.load import config_error
 T = TypeVar("T")
 
 
-def read_params(kind: type[T], values: Mapping[str, Any], origin: str) -> T:
+def read_params(kind: type[T], values: Mapping[str, Any], origin: str, advice: str) -> T:
     """Build settings from nested plain values, checked against their bounds.
 
     Args:
         kind: Frozen dataclass of plain values and of others like it.
         values: By name; absent ones keep their defaults.
         origin: Where they come from, for messages.
+        advice: What to do about a mistake, for messages.
 
     Raises:
         ConfigError: A name that does not exist, or a value out of bounds.
@@ -28,4 +29,4 @@ def read_params(kind: type[T], values: Mapping[str, Any], origin: str) -> T:
     try:
         return cast(T, model(settings=dict(values)).settings)  # type: ignore[attr-defined]
     except ValidationError as error:
-        raise config_error(origin, error) from error
+        raise config_error(origin, error, advice) from error

@@ -53,8 +53,8 @@ class Encounter:
 
     @property
     def recognised(self) -> bool:
-        """Whether the monitor said what it was."""
-        return self.said == self.expected
+        """Whether the monitor said what it was before it was over."""
+        return self.said == self.expected and self.said_s <= self.end_s
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,6 +114,11 @@ class ClipWitness:
         self._entities: dict[int, Counter[int]] = {}
         self._said: dict[str, _Said] = {}
 
+    @property
+    def has_seen_all(self) -> bool:
+        """Whether every frame of the clip was taken; the score is of the whole clip."""
+        return self._notes.taken == self._clip.frame_count
+
     def take(self, result: FrameResult) -> None:
         """Take the next frame."""
         self._time_s[result.frame.index] = result.frame.time_s
@@ -128,7 +133,7 @@ class ClipWitness:
                 said.first_s.setdefault(event.severity, event.time_s)
 
     def score(self) -> ClipScore:
-        """Compare what was taken with the truth."""
+        """Compare what was taken with the truth of the whole clip; see `has_seen_all`."""
         clip, watched = self._clip, self._notes.watched
         said = self._said_of_entities()
         encounters = sorted(self._encounters(said), key=lambda one: one.start_s)

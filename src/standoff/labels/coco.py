@@ -54,7 +54,8 @@ def read_coco(paths: Sequence[Path], pictures: Path | None) -> SourceSet:
 
     Args:
         paths: The files; `train.json` or `instances_val2017.json` say the split of their pictures.
-        pictures: Folder of the pictures; None: beside a file, or in the folder above.
+        pictures: Folder of the pictures; None: beside a file or in the folder above, or there in `images` or in a
+            folder named after the file.
 
     Raises:
         DataError: A file is not COCO.
@@ -99,7 +100,10 @@ def _sortable(number: object) -> tuple[str, float, str]:
 def _folders(path: Path, pictures: Path | None) -> tuple[Path, ...]:
     if pictures is not None:
         return (pictures,)
-    return tuple(folder / inner for folder in (path.parent, path.parent.parent) for inner in ("", "images", path.stem))
+    # COCO's own instances_train2017.json goes with train2017/, CVAT's instances_default.json with images/default/.
+    name = path.stem.removeprefix("instances_")
+    inners = ("", "images", path.stem, name, f"images/{name}")
+    return tuple(folder / inner for folder in (path.parent, path.parent.parent) for inner in inners)
 
 
 def _entries(content: dict[str, Any], key: str, path: Path) -> list[_Entry]:

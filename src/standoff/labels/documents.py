@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +37,30 @@ def read_json(path: Path) -> dict[str, Any]:
     except (json.JSONDecodeError, RecursionError) as error:
         raise DataError(expected=f"JSON in {path}", found=str(error), fix="export it again") from error
     return _checked(content, path, "JSON")
+
+
+def check_types(entry: Mapping[str, Any], types: Mapping[str, tuple[type, ...]], where: str) -> None:
+    """Check that all keys are known and their values of a kind that is meant.
+
+    Args:
+        entry: Names and values.
+        types: What a value may be, by name; True and False are no numbers.
+        where: The entry, for messages.
+
+    Raises:
+        DataError: A key that is not known, or a value of another type.
+    """
+    for key, value in entry.items():
+        if key not in types:
+            raise DataError(expected=f"{', '.join(types)} in {where}", found=f"`{key}`", fix="remove or correct it")
+        if not isinstance(value, types[key]) or (isinstance(value, bool) and bool not in types[key]):
+            kinds = " or ".join(kind.__name__ for kind in types[key])
+            raise DataError(expected=f"`{key}` as {kinds} in {where}", found=repr(value), fix="correct it")
+
+
+def resolve_path(text: str, folder: Path) -> Path:
+    """Return a path relative to a folder, with `~` and $VARIABLES filled in."""
+    return folder / Path(os.path.expandvars(text)).expanduser()
 
 
 def _read_text(path: Path) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -10,7 +9,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from standoff.core.errors import DataError
-from standoff.labels.documents import read_yaml
+from standoff.labels.documents import check_types, read_yaml, resolve_path
 from standoff.labels.types import SPLITS, Split
 from standoff.labels.yolo import labels_of
 
@@ -92,7 +91,7 @@ def read_mixture(path: Path) -> Mixture:
         DataError: Not readable, an unknown name, or a value of the wrong kind.
     """
     content = read_yaml(path)
-    _check_types(content, _MIXTURE_TYPES, str(path))
+    check_types(content, _MIXTURE_TYPES, str(path))
     entries = content.get("sources") or []
     sources = [_source(entry, f"source {number} of {path}", path.parent) for number, entry in enumerate(entries, 1)]
     names = [source.name for source in sources]
@@ -113,11 +112,11 @@ def read_mixture(path: Path) -> Mixture:
 def _source(entry: object, where: str, folder: Path) -> Source:
     if not isinstance(entry, dict) or "path" not in entry:
         raise DataError(expected=f"`path` in {where}", found=repr(entry), fix="write `path: FOLDER or FILE`")
-    _check_types(entry, _TYPES, where)
+    check_types(entry, _TYPES, where)
     _check_splits(entry, where)
-    path = _resolve(entry["path"], folder)
+    path = resolve_path(entry["path"], folder)
     chosen: dict[str, Any] = {key: entry[key] for key in ("held_out", "split", "negatives") if key in entry}
-    chosen |= {key: _resolve(entry[key], folder) for key in ("pictures", "ignore_regions") if key in entry}
+    chosen |= {key: resolve_path(entry[key], folder) for key in ("pictures", "ignore_regions") if key in entry}
     if "names" in entry:
         chosen["names"] = labels_of(entry["names"], Path(where))
     if "class_map" in entry:
@@ -130,15 +129,6 @@ def _source(entry: object, where: str, folder: Path) -> Source:
     if not 0.0 < weight < float("inf"):
         raise DataError(expected=f"a `weight` over 0 in {where}", found=str(weight), fix="correct it")
     return Source(path, entry.get("name", path.name), weight=weight, **chosen)
-
-
-def _check_types(entry: Mapping[str, Any], types: Mapping[str, tuple[type, ...]], where: str) -> None:
-    for key, value in entry.items():
-        if key not in types:
-            raise DataError(expected=f"{', '.join(types)} in {where}", found=f"`{key}`", fix="remove or correct it")
-        if not isinstance(value, types[key]) or (isinstance(value, bool) and bool not in types[key]):
-            kinds = " or ".join(kind.__name__ for kind in types[key])
-            raise DataError(expected=f"`{key}` as {kinds} in {where}", found=repr(value), fix="correct it")
 
 
 def _check_splits(entry: Mapping[str, Any], where: str) -> None:
@@ -176,8 +166,3 @@ def _pattern(text: str, where: str) -> re.Pattern[str]:
             fix="put parentheses around what names the scene, as in '(.*)-[0-9]+'",
         )
     return pattern
-
-
-def _resolve(text: str, folder: Path) -> Path:
-    """Return a path relative to a folder, with `~` and $VARIABLES filled in."""
-    return folder / Path(os.path.expandvars(text)).expanduser()

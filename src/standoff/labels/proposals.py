@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 from urllib.parse import quote
 
-from standoff.core.errors import OutputError
 from standoff.core.types import Detections
 from standoff.labels.coco_document import CocoDocument
+from standoff.stages.sinks.json_text import json_text
+from standoff.stages.sinks.whole import whole_file
 
 _LOCAL_FILES: Final = "/data/local-files/?d="
 """How Label Studio names files of a folder that it is allowed to serve."""
@@ -125,12 +125,5 @@ def _rectangles(picture: ProposedPicture, classes: Sequence[str]) -> list[dict[s
 
 
 def _write_whole(content: object, out: Path) -> None:
-    staging = out.with_name(f".{out.name}.partial")
-    try:
-        staging.write_text(json.dumps(content, indent=1), encoding="utf-8")
-        staging.replace(out)
-    except OSError as error:
-        staging.unlink(missing_ok=True)
-        raise OutputError(
-            expected=f"a place to write {out}", found=str(error.strerror or error), fix="choose another one"
-        ) from error
+    with whole_file(out) as path:
+        path.write_text(json_text(content), encoding="utf-8")

@@ -23,6 +23,8 @@ from standoff.labels.types import SPLITS, LabelledData, LabelledPicture, Problem
 
 _OWN_REGIONS: Final = "ignore.yaml"
 """In a set's folder: the regions that it says itself nothing is known of, as simulated composites have them."""
+CUT_GROUP: Final = "group in two splits"
+"""Kind of problem of a set whose own splits cut a scene."""
 _NOWHERE: Final = np.zeros((0, 4))
 
 
@@ -139,7 +141,7 @@ def _splits_of_groups(groups: Sequence[str], splits: Sequence[Split | None]) -> 
 
 def _cut_groups(source: Source, split_of: Mapping[str, Sequence[Split]]) -> list[Problem]:
     return [
-        Problem(source.path, f"'{group}' is in {' and '.join(found)}", "group in two splits", skipped_picture=False)
+        Problem(source.path, f"'{group}' is in {' and '.join(found)}", CUT_GROUP, skipped_picture=False)
         for group, found in split_of.items()
         if len(found) > 1
     ]

@@ -20,7 +20,7 @@ def read_regions(path: Path) -> dict[str, FloatArray]:
     Raises:
         DataError: It cannot be read, or holds something else.
     """
-    regions = {str(stem): _corners(boxes) for stem, boxes in read_yaml(path).items()}
+    regions = {str(stem): corners_of(boxes) for stem, boxes in read_yaml(path).items()}
     wrong = sorted(stem for stem, boxes in regions.items() if boxes is None)
     if wrong:
         raise DataError(
@@ -31,7 +31,8 @@ def read_regions(path: Path) -> dict[str, FloatArray]:
     return {stem: boxes for stem, boxes in regions.items() if boxes is not None}
 
 
-def _corners(boxes: object) -> FloatArray | None:
+def corners_of(boxes: object) -> FloatArray | None:
+    """Return (N, 4) left, top, right, bottom as YAML gives them; None where it is something else."""
     try:
         corners = np.array(boxes, dtype=np.float64).reshape(-1, 4)
     except (TypeError, ValueError):

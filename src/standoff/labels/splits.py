@@ -1,4 +1,4 @@
-"""Which scene a picture belongs to, and which scenes are held out."""
+"""Which scene a picture belongs to, which scenes are held out, and which few pictures stand for many."""
 
 from __future__ import annotations
 
@@ -6,12 +6,15 @@ import hashlib
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Final
+
+import numpy as np
 
 from standoff.core.errors import DataError
 from standoff.labels.mixture import Source
 from standoff.labels.source import SourcePicture
-from standoff.labels.types import Split
+from standoff.labels.types import LabelledData, LabelledPicture, Split
 
 DEFAULT_HELD_OUT: Final[Mapping[Split, float]] = {"val": 0.1, "test": 0.1}
 _SHOWN: Final = 12
@@ -39,7 +42,16 @@ def group_of(picture: SourcePicture, pattern: re.Pattern[str] | None) -> str:
                 fix="correct the regular expression",
             )
         return found[1]
-    return picture.scene or _TRAILING_NUMBER.sub("", picture.path.stem) or picture.path.parent.name
+    return picture.scene or flight_of(picture.path)
+
+
+def flight_of(path: Path) -> str:
+    """Return what a picture seems to be a part of: its name less the last number, or its folder.
+
+    >>> [flight_of(Path(name)) for name in ("DJI_0005-0018.jpg", "DJI_0031.JPG", "MOS76.png", "roof/7.png")]
+    ['DJI_0005', 'DJI', 'MOS', 'roof']
+    """
+    return _TRAILING_NUMBER.sub("", path.stem) or path.parent.name
 
 
 def split_pictures(
@@ -120,6 +132,41 @@ def hold_out(groups: Sequence[str], held_out: Mapping[Split, float], seed: int) 
         if len(train) > 1:
             split_of[min(train, key=lambda group: size[group])] = split
     return split_of
+
+
+def require_splits(data: LabelledData, needed: Sequence[Split]) -> None:
+    """Refuse data without pictures in a split.
+
+    Args:
+        data: To be trained on, say.
+        needed: The splits.
+
+    Raises:
+        DataError: One of them is empty; says so when all pictures are of one scene.
+    """
+    empty = [split for split in needed if not data.splits[split]]
+    if not empty:
+        return
+    every = [picture for pictures in data.splits.values() for picture in pictures]
+    scenes = {picture.group for picture in every}
+    if len(scenes) == 1:
+        found = f"that all pictures are of one scene ({_scene(every[0])})"
+        fix = "add another video, or give `group` in a mixture file"
+    else:
+        found = f"none in {' and '.join(empty)}"
+        fix = "give data with these splits, or `held_out` in a mixture file"
+    raise DataError(expected=f"pictures in the splits {' and '.join(needed)}", found=found, fix=fix)
+
+
+def spread(pictures: Sequence[LabelledPicture], count: int) -> tuple[LabelledPicture, ...]:
+    """Return at most `count` pictures, evenly over the sequence."""
+    if len(pictures) <= count:
+        return tuple(pictures)
+    return tuple(pictures[int(index)] for index in np.linspace(0, len(pictures) - 1, count))
+
+
+def _scene(picture: LabelledPicture) -> str:
+    return picture.group.removeprefix(f"{picture.source}/")
 
 
 def _split_as_named(source: Source, groups: Sequence[str]) -> list[Split | None]:

@@ -142,18 +142,29 @@ def _read_listed(listed: Sequence[_Listed], labels: tuple[str, ...]) -> SourceSe
 def _read_picture(labels: tuple[str, ...], listed: _Listed) -> SourcePicture:
     path, split = listed
     size_px = read_size_px(path)
-    rows = _read_rows(_label_file(path))
-    unknown = [number for number in rows[:, 0] if number not in range(len(labels))]
+    numbers, xyxy_px = read_boxes(path, size_px)
+    unknown = [number for number in numbers if number not in range(len(labels))]
     if unknown:
         raise BadPicture(path, f"class id {unknown[0]:g}, of {len(labels)} classes", "unknown class id")
-    return SourcePicture(
-        path,
-        size_px,
-        tuple(labels[int(number)] for number in rows[:, 0]),
-        _to_corners(rows[:, 1:], size_px),
-        np.zeros(len(rows), np.bool_),
-        split,
-    )
+    names = tuple(labels[int(number)] for number in numbers)
+    return SourcePicture(path, size_px, names, xyxy_px, np.zeros(len(names), np.bool_), split)
+
+
+def read_boxes(picture: Path, size_px: tuple[int, int]) -> tuple[FloatArray, FloatArray]:
+    """Read the label file of a picture.
+
+    Args:
+        picture: Its labels lie beside it, or in `labels` where it is in `images`.
+        size_px: (width, height) of the picture.
+
+    Returns:
+        (N,) class ids as written, and (N, 4) boxes; 0 is the centre of the first pixel.
+
+    Raises:
+        BadPicture: There is no label file, or it holds something else.
+    """
+    rows = _read_rows(_label_file(picture))
+    return rows[:, 0], _to_corners(rows[:, 1:], size_px)
 
 
 def _label_file(picture: Path) -> Path:

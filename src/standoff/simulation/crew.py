@@ -101,8 +101,24 @@ def _work(factory: Factory[Job, Result], line: Connection, threads: int) -> None
     try:
         with factory() as worker:
             while True:
-                line.send(worker(line.recv()))
+                job = line.recv()
+                try:
+                    result = worker(job)
+                except Exception as error:
+                    raise _failed(error) from error
+                line.send(result)
     except StandoffError as error:
         line.send(error)
     except (EOFError, BrokenPipeError, KeyboardInterrupt):
         return
+
+
+def _failed(error: Exception) -> StandoffError:
+    """Return the error to send: one that is ours as it is, another in words, because not every exception can travel."""
+    if isinstance(error, StandoffError):
+        return error
+    return SimulationError(
+        expected="a rendering process without an error",
+        found=f"{type(error).__name__}: {error}",
+        fix="run again with --processes 1 to see where it comes from",
+    )

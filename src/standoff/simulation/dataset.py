@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator
 from contextlib import closing, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Literal, get_args
@@ -16,7 +16,7 @@ from standoff.labels.types import Split
 from standoff.simulation.covers import COVER_KINDS
 from standoff.simulation.crew import work_through
 from standoff.simulation.moment import scene_at
-from standoff.simulation.picture_set import Picture, PictureSet, draw_split, is_marked
+from standoff.simulation.picture_set import SET_FILES, Picture, PictureSet, draw_split, is_marked
 from standoff.simulation.presets import MAX_SEED, Condition, CoverPlan, Plan, Preset, check_seed, check_size
 from standoff.simulation.render import Look
 from standoff.simulation.scene import Scene
@@ -95,7 +95,7 @@ def record_dataset(
         OutputError: The folder cannot be used.
         MissingDependency: No OpenGL.
     """
-    with whole_folder(out, overwrite=overwrite) as folder:
+    with whole_folder(out, overwrite=overwrite, own=SET_FILES) as folder:
         pictures = PictureSet(folder, plan.layout)
         jobs = range(plan.scenes)
         scenes = work_through(partial(open_scene_shooter, plan), jobs, processes=min(processes, len(jobs)))
@@ -105,8 +105,7 @@ def record_dataset(
                     pictures.add(plan.split_of(scene), picture)
                     if on_picture is not None:
                         on_picture()
-        settings = {"images": plan.images, "per_scene": plan.per_scene, "seed": plan.seed, "scenes": plan.scenes}
-        pictures.finish(f"standoff simulated sites, seed {plan.seed}", settings)
+        pictures.finish(f"standoff simulated sites, seed {plan.seed}", {**asdict(plan), "scenes": plan.scenes})
 
 
 @contextmanager

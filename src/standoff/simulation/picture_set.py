@@ -6,20 +6,20 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 import yaml
 
+from standoff import __version__
 from standoff.core.classes import CLASSES
+from standoff.labels.marking import would_be_marked
 from standoff.labels.types import SPLITS, Split
 from standoff.simulation.coco import Annotations
 from standoff.simulation.truth import Row
 
-_MIN_VISIBLE_PX, _MIN_SIDE_PX = 16, 6
-_MIN_VISIBLE_SHARE = 0.15
-_PLAIN_PX = 1500
-"""Of a machine is plain to see, however small a share of it that is."""
+SET_FILES: Final = ("images", "labels", "annotations", "ignore.yaml", "data.yaml", "dataset.json")
+"""What a data set holds at its top."""
 
 Box = tuple[float, float, float, float]
 
@@ -97,7 +97,7 @@ class PictureSet:
 
         Args:
             description: For COCO's layout.
-            settings: What the set was made with, for `dataset.json`.
+            settings: What the set was made with, for `dataset.json`; paths become their text.
         """
         if self._layout == "coco":
             (self._folder / "annotations").mkdir()
@@ -109,7 +109,9 @@ class PictureSet:
         names = {site_class.id: site_class.name for site_class in CLASSES}
         content: dict[str, Any] = {**{split: f"images/{split}" for split in SPLITS}, "names": names}
         (self._folder / "data.yaml").write_text(yaml.safe_dump(content, sort_keys=False))
-        (self._folder / "dataset.json").write_text(json.dumps(settings))
+        (self._folder / "dataset.json").write_text(
+            json.dumps({"standoff": __version__, **settings}, default=str, indent=2)
+        )
 
 
 def yolo_line(row: Row, size_px: tuple[int, int]) -> str:
@@ -131,7 +133,6 @@ def yolo_line(row: Row, size_px: tuple[int, int]) -> str:
 
 def is_marked(row: Row) -> bool:
     """Return whether somebody who marks pictures would mark an entity; the rest is too small or too hidden."""
-    side_px = max(row["x2_px"] - row["x1_px"], row["y2_px"] - row["y1_px"])
-    if row["visible_px"] < _MIN_VISIBLE_PX or side_px < _MIN_SIDE_PX:
-        return False
-    return bool(row["visible_share"] >= _MIN_VISIBLE_SHARE or row["visible_px"] >= _PLAIN_PX)
+    box_px = np.array([[row[f"{name}_px"] for name in ("x1", "y1", "x2", "y2")]], dtype=np.float64)
+    seen = (np.array([row[name]], dtype=np.float64) for name in ("visible_px", "visible_share"))
+    return bool(would_be_marked(box_px, *seen)[0])

@@ -32,6 +32,13 @@ from standoff.stages.ground import save_camera
 from standoff.stages.sinks.whole import whole_folder
 
 FORMAT = 1
+CLIP_FILES = frozenset(
+    {
+        "video.mp4", "truth.parquet", "pairs.parquet", "frames.parquet", "annotations.json", "scene.json",
+        "camera.yaml", "reference.yaml", "telemetry.srt",
+    }
+)  # fmt: skip
+"""What a clip holds."""
 """Of the clip folder; `scene.json` carries it."""
 
 
@@ -64,7 +71,7 @@ def record_clip(
         OutputError: The folder cannot be used.
         MissingDependency: No OpenGL.
     """
-    with whole_folder(out, overwrite=overwrite) as folder:
+    with whole_folder(out, overwrite=overwrite, own=CLIP_FILES) as folder:
         site = build_site(plan)
         times_s = frame_times_s(plan)
         tables = Tables()

@@ -2,12 +2,13 @@
 
 A network that learnt machines from rendered sites and one that still knows real people make one detector that knows
 both. Each sees the same input; their boxes are put one after another, and the suppression of overlapping boxes of one
-class, which follows every detector, merges what both have found. The time a picture takes is the sum of theirs.
+class, which follows every detector, merges what both have found. Scores of two networks mean different things: a factor
+for the one that is wrong more often lets the other be heard first. The time a picture takes is the sum of theirs.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -22,23 +23,26 @@ from standoff.training.quantization.onnx_file import read_own_model
 _BOX_COLUMNS = 5
 """Centre, sides and objectness, before the classes."""
 
+_ALL = "all"
+
 _Floats = npt.NDArray[np.float32]
 _Model = tuple[onnx.ModelProto, ModelCard]
 
 
-def join_models(parts: Sequence[tuple[Path, Sequence[str]]], out: Path) -> ModelCard:
+def join_models(parts: Sequence[tuple[Path, Mapping[str, float]]], out: Path) -> ModelCard:
     """Join detectors of the same classes and input size.
 
     Args:
-        parts: Each file, made by `standoff export` or `standoff train`, and the classes that it answers for; none
-            given: all.
+        parts: Each file, made by `standoff export` or `standoff train`, and the classes that it answers for with the
+            factor, over 0 to 1, of their scores; `all` is every class that is not named, and nothing means all.
         out: The ONNX file; appears only when complete, and replaces an older one.
 
     Returns:
         What the file says about itself.
 
     Raises:
-        ConfigError: There are fewer than two parts, a part does not know a class, or nobody answers for one.
+        ConfigError: There are fewer than two parts, a part does not know a class, nobody answers for one, or a factor
+            is out of its range.
         ModelError: A part is no such model, or differs in its classes, input size or operators from the first.
         OutputError: The file cannot be written.
     """
@@ -53,8 +57,8 @@ def join_models(parts: Sequence[tuple[Path, Sequence[str]]], out: Path) -> Model
         _check_alike(parts[0][0], path, (read[0], other))
     models, cards = [model for model, _ in read], [card for _, card in read]
     classes = cards[0].classes
-    shares = [_answers_for(path, named, classes) for path, named in parts]
-    silent = [name for name, heard in zip(classes, np.max(shares, axis=0), strict=True) if not heard]
+    factors = [_factors(path, named, classes) for path, named in parts]
+    silent = [name for name, heard in zip(classes, np.max(factors, axis=0), strict=True) if not heard]
     if silent:
         raise ConfigError(
             expected="a model that answers for each class",
@@ -68,7 +72,7 @@ def join_models(parts: Sequence[tuple[Path, Sequence[str]]], out: Path) -> Model
         # Runs call their models alike: the folder tells them apart.
         sources={f"{path.resolve().parent.name}/{path.name}": file_sha256(path) for path, _ in parts},
     )
-    joined = _joined(models, shares)
+    joined = _joined(models, factors)
     onnx.helper.set_model_props(joined, card.to_metadata())
     with whole_file(out) as path:
         onnx.save(joined, str(path))
@@ -98,26 +102,28 @@ def _text(values: tuple[object, ...]) -> str:
     return ", ".join(str(value) for value in values)
 
 
-def _answers_for(
-    path: Path, named: Sequence[str], classes: tuple[str, ...]
-) -> np.ndarray[tuple[int], np.dtype[np.float32]]:
-    """Return (C,) 1 for classes that a part answers for, 0 for the others."""
-    unknown = [name for name in named if name not in classes]
+def _factors(path: Path, named: Mapping[str, float], classes: tuple[str, ...]) -> _Floats:
+    """Return (C,) factors of a part's scores; 0 for classes that it does not answer for."""
+    unknown = [name for name in named if name not in (*classes, _ALL)]
     if unknown:
         raise ConfigError(
-            expected=f"classes of {path.name}: {', '.join(classes)}",
+            expected=f"classes of {path.name}: {', '.join(classes)}, or {_ALL}",
             found=", ".join(unknown),
             fix="name only those",
         )
-    return np.array([not named or name in named for name in classes], dtype=np.float32)
+    wrong = [f"{name}:{factor:g}" for name, factor in named.items() if not 0 < factor <= 1]
+    if wrong:
+        raise ConfigError(expected="factors over 0 to 1", found=", ".join(wrong), fix="write for example worker:0.5")
+    others = named.get(_ALL, 0.0) if named else 1.0
+    return np.array([named.get(name, others) for name in classes], dtype=np.float32)
 
 
-def _joined(models: Sequence[onnx.ModelProto], shares: Sequence[_Floats]) -> onnx.ModelProto:
+def _joined(models: Sequence[onnx.ModelProto], factors: Sequence[_Floats]) -> onnx.ModelProto:
     """Return one graph of all: one input, and the rows of the outputs one after another."""
     nodes: list[onnx.NodeProto] = []
     tensors: list[onnx.TensorProto] = []
     outputs: list[str] = []
-    for index, (model, share) in enumerate(zip(models, shares, strict=True)):
+    for index, (model, factor) in enumerate(zip(models, factors, strict=True)):
         prefix = f"part{index}_"
         graph = onnx.compose.add_prefix_graph(model.graph, prefix)
         for node in graph.node:
@@ -125,16 +131,16 @@ def _joined(models: Sequence[onnx.ModelProto], shares: Sequence[_Floats]) -> onn
         nodes += graph.node
         tensors += graph.initializer
         boxes = prefix + OUTPUT_NAME
-        if not share.all():
-            kept = np.concatenate([np.ones(_BOX_COLUMNS, np.float32), share]).reshape(1, 1, -1)
-            tensors.append(onnx.numpy_helper.from_array(kept, f"{prefix}kept"))
-            nodes.append(onnx.helper.make_node("Mul", [boxes, f"{prefix}kept"], [f"{boxes}_kept"]))
-            boxes += "_kept"
+        if (factor != 1).any():
+            columns = np.concatenate([np.ones(_BOX_COLUMNS, np.float32), factor]).reshape(1, 1, -1)
+            tensors.append(onnx.numpy_helper.from_array(columns, f"{prefix}factors"))
+            nodes.append(onnx.helper.make_node("Mul", [boxes, f"{prefix}factors"], [f"{boxes}_scaled"]))
+            boxes += "_scaled"
         outputs.append(boxes)
     nodes.append(onnx.helper.make_node("Concat", outputs, [OUTPUT_NAME], axis=1))
     first = models[0].graph
     rows = sum(model.graph.output[0].type.tensor_type.shape.dim[1].dim_value for model in models)
-    columns = first.output[0].type.tensor_type.shape.dim[2].dim_value
-    result = onnx.helper.make_tensor_value_info(OUTPUT_NAME, onnx.TensorProto.FLOAT, [1, rows, columns])
+    width = first.output[0].type.tensor_type.shape.dim[2].dim_value
+    result = onnx.helper.make_tensor_value_info(OUTPUT_NAME, onnx.TensorProto.FLOAT, [1, rows, width])
     graph = onnx.helper.make_graph(nodes, "joined", list(first.input), [result], tensors)
     return onnx.helper.make_model(graph, opset_imports=models[0].opset_import, ir_version=models[0].ir_version)

@@ -40,6 +40,10 @@ def seen_clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
     unseen = [value != value for value in table["x1_px"].to_pylist()]
     shares = [0.1 if hidden else 1.0 for hidden in loader]
     pixels = [0 if gone else 60 for gone in unseen]
+    # What is 60 px large is longer than the three pixels of the drawn boxes.
+    for name, outwards_px in (("x1_px", -3.0), ("y1_px", -3.0), ("x2_px", 3.0), ("y2_px", 3.0)):
+        edges_px = pa.array([edge + outwards_px for edge in table[name].to_pylist()])
+        table = table.set_column(table.column_names.index(name), name, edges_px)
     table = table.append_column("visible_share", pa.array(shares)).append_column("visible_px", pa.array(pixels))
     pq.write_table(table, folder / "truth.parquet")
     return folder

@@ -85,6 +85,8 @@ def test_people_in_a_table_are_taken_frame_by_frame(tmp_path: Path, seen_clip: P
     assert [frame.index for frame in material.frames()] == [0, 1, 2]
     part = opened(csv, video=seen_clip / "video.mp4", frames=(3, 3))
     assert part.frame_index.tolist() == [2]
+    later = write_people(tmp_path / "later.csv", rows[1:])
+    assert opened(later, video=seen_clip / "video.mp4").frame_index.tolist() == [2]
 
 
 def test_labelled_pictures_come_under_the_sites_classes(tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ from stages.detect.conftest import CELL_PX, MakeModel
 from typer.testing import CliRunner
 
 from standoff.cli.app import app
-from standoff.core.errors import ConfigError, DataError, ModelError, StandoffError
+from standoff.core.errors import ConfigError, DataError, ModelError, OutputError, StandoffError
 
 SIDE_PX = 64
 SCENES = 6
@@ -88,6 +89,36 @@ def test_models_stand_side_by_side_with_what_chance_may_do(cells: Path, model: P
     text = evaluate(*words)
     assert "does not know excavator, vehicle: AP 0" in " ".join(text.split())
     assert "more than chance" in " ".join(text.split())
+
+
+def test_models_of_one_name_are_told_apart_by_their_folders(cells: Path, model: Path, tmp_path: Path) -> None:
+    files = [tmp_path / name / "w" / "model.onnx" for name in ("x", "y")]
+    for file in files:
+        file.parent.mkdir(parents=True)
+        shutil.copy(model, file)
+    words = [word for file in (*files, model) for word in ("--model", file)]
+    result = json.loads(evaluate("--data", cells, *words, "--json", "-"))
+    assert [one["label"] for one in result["models"]] == ["x/w/model", "y/w/model", model.parent.name + "/model"]
+    with pytest.raises(ConfigError, match="model 2 times"):
+        evaluate("--data", cells, "--model", model, "--model", model)
+
+
+def test_an_output_that_cannot_be_written_costs_no_table(cells: Path, model: Path, tmp_path: Path) -> None:
+    result = CliRunner().invoke(
+        app,
+        [
+            "evaluate",
+            "detection",
+            "--data",
+            str(cells),
+            "--model",
+            str(model),
+            "--json",
+            str(tmp_path / "no" / "r.json"),
+        ],
+    )
+    assert isinstance(result.exception, OutputError)
+    assert "AP11" in result.stdout
 
 
 def test_machines_can_be_scored_as_one_class_and_a_class_left_out(cells: Path, model: Path) -> None:

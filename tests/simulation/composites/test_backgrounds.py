@@ -106,3 +106,22 @@ def test_with_few_flights_or_none_held_out_all_are_for_training(flights: int, he
     backgrounds = [b for k in range(flights) for b in _flight(f"f{k}", 3)]
     splits = split_backgrounds(backgrounds, held_out)
     assert len(splits["train"]) == len(backgrounds) and not splits["val"] and not splits["test"]
+
+
+@pytest.mark.parametrize(
+    ("entry", "message"),
+    [
+        ("photos/*.jpg", "entry 1 of"),
+        ({"pictures": "*.jpg", "pitch_deg": "steep"}, "pitch_deg"),
+        ({"pictures": "*.jpg", "px_per_m": "abc"}, "px_per_m"),
+        ({"pictures": "*.jpg", "ignore_px": [[0, 0, 1]]}, "ignore_px"),
+        ({"pictures": "*.jpg", "labels": ["vehicle"]}, "labels"),
+        ({"pictures": "*.jpg", "group": "site/a"}, "without /"),
+        ({"pictures": "*.jpg", "colour": "green"}, "colour"),
+    ],
+)
+def test_an_entry_that_is_wrong_is_refused_in_one_line(tmp_path: Path, entry: object, message: str) -> None:
+    _photograph(tmp_path / "f-1.jpg")
+    (tmp_path / "list.yaml").write_text(yaml.safe_dump([entry]))
+    with pytest.raises(DataError, match=message):
+        find_backgrounds([str(tmp_path / "list.yaml")])

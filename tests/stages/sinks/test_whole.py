@@ -1,11 +1,16 @@
 from __future__ import annotations
 
+import errno
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 from standoff.core.errors import OutputError
-from standoff.stages.sinks.whole import whole_file, whole_folder
+from standoff.stages.sinks.whole import whole_file
+from standoff.stages.sinks.whole import whole_folder as any_whole_folder
+
+whole_folder = partial(any_whole_folder, own=("a.txt", "old.txt"))
 
 
 def test_a_folder_appears_when_the_block_has_ended(tmp_path: Path) -> None:
@@ -52,6 +57,38 @@ def test_a_used_folder_a_file_and_a_forbidden_place_are_refused(tmp_path: Path) 
         whole_folder(tmp_path / "used" / "a.txt" / "b", overwrite=True),
     ):
         pass
+
+
+def test_what_is_not_ours_is_never_replaced(tmp_path: Path) -> None:
+    film = tmp_path / "flights" / "site.mp4"
+    film.parent.mkdir()
+    film.write_text("film")
+    (film.parent / "a.txt").write_text("a")
+    with pytest.raises(OutputError, match=r"site\.mp4") as refused, whole_folder(film.parent, overwrite=True):
+        pytest.fail("not to be replaced")
+    assert "--overwrite" not in str(refused.value)
+    assert film.read_text() == "film"
+
+
+def test_a_link_is_followed(tmp_path: Path) -> None:
+    (tmp_path / "real").mkdir()
+    (tmp_path / "link").symlink_to(tmp_path / "real")
+    with whole_folder(tmp_path / "link", overwrite=False) as folder:
+        (folder / "a.txt").write_text("a")
+    assert (tmp_path / "link").is_symlink()
+    assert (tmp_path / "real" / "a.txt").read_text() == "a"
+
+
+def test_the_current_folder_is_refused_before_the_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(OutputError, match="current folder"), whole_folder(Path(), overwrite=False):
+        pytest.fail("not to be begun")
+
+
+def test_a_full_disk_is_an_error_in_one_line(tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match="No space"), whole_folder(tmp_path / "clip", overwrite=False):
+        raise OSError(errno.ENOSPC, "No space left on device")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_file_that_is_not_finished_leaves_the_older_one_alone(tmp_path: Path) -> None:

@@ -72,7 +72,13 @@ def test_mirrors_and_quarter_turns_keep_boxes_exact(seed: int) -> None:
 @given(st.integers(0, 10_000), st.floats(12.0, 60.0))
 def test_a_person_who_is_aimed_at_is_in_the_view_and_of_the_wanted_height(seed: int, height_px: float) -> None:
     params = AugmentParams(
-        aim=1.0, whole=0.0, tilted=0.0, stretch=1.0, person_height_px=(height_px, height_px), zoom=(0.01, 100.0)
+        aim=1.0,
+        whole=0.0,
+        tilted=0.0,
+        stretch=1.0,
+        person_classes=(0,),
+        person_height_px=(height_px, height_px),
+        zoom=(0.01, 100.0),
     )
     params = replace(params, least_fill=0.01)
     picture = label(np.array([[300.0, 200.0, 310.0, 230.0]]))
@@ -163,3 +169,9 @@ def test_a_rare_class_in_a_crowd_is_aimed_at_as_often_as_the_crowd() -> None:
         view = draw_view(np.random.default_rng(seed), picture, (100, 100), params)
         shows_rare.append(0 < view.carry(boxes_px[-1:])[0, [0, 2]].mean() < 100)
     assert np.mean(shows_rare) == pytest.approx(0.5, abs=0.11)
+
+
+def test_people_are_known_by_what_their_class_is_called() -> None:
+    assert AugmentParams().for_classes(("excavator", "Person", "worker", "tree")).person_classes == (1, 2)
+    assert AugmentParams().for_classes(("tree", "kite")).person_classes == ()
+    assert AugmentParams(person_classes=(0,)).for_classes(("car", "person")).person_classes == (0,)

@@ -127,6 +127,26 @@ def test_a_corrupt_picture_is_left_out_and_named(tmp_path: Path) -> None:
     assert report.deciding_pictures == 29
 
 
+def test_only_pictures_that_can_be_read_calibrate(
+    tmp_path: Path, squares: LabelledData, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    train = squares.splits["train"][:10]
+    lost = tuple(replace(picture, path=tmp_path / "gone.png") for picture in train[:4])
+    harmed: list[int] = []
+
+    def by_harm(self: Int8Network, ranges: object, inputs: list[object], step: object) -> tuple[str, ...]:
+        harmed.append(len(inputs))
+        return self.layers
+
+    monkeypatch.setattr(Int8Network, "by_harm", by_harm)
+    data = LabelledData(squares.classes, {**squares.splits, "train": lost + train[4:]}, ())
+    report, _ = _quantize(write_detector(tmp_path, passing=12, loud=[0]), data)
+    assert report.calibration_pictures == 6 and harmed == [3]
+    data = LabelledData(squares.classes, {**squares.splits, "train": lost}, ())
+    with pytest.raises(DataError, match="found none of 4"):
+        _quantize(write_detector(tmp_path), data)
+
+
 def test_a_class_with_few_truths_is_named_and_does_not_decide(tmp_path: Path, squares: LabelledData) -> None:
     def thinned(picture: LabelledPicture, keep_vehicles: bool) -> LabelledPicture:
         kept = (picture.class_id == 0) | keep_vehicles
@@ -216,6 +236,12 @@ def test_no_scene_calibrates_and_decides(train: int, val: list[str], wanted: int
     assert 0 < len(calibrating) <= wanted
     assert not {one.group for one in calibrating} & {one.group for one in deciding}
     assert set(deciding) <= set(data.splits[split]) and deciding
+
+
+def test_calibration_is_spread_over_the_whole_split() -> None:
+    data = _data({"train": [f"t{number}" for number in range(19)], "val": ["v"], "test": []})
+    calibrating, _ = divide_pictures(data, QuantizationPlan(calibration_pictures=10))
+    assert [one.path.stem for one in calibrating] == [f"train{number}" for number in range(0, 19, 2)]
 
 
 def _data(groups: dict[Split, list[str]]) -> LabelledData:

@@ -104,6 +104,8 @@ def test_without_a_whole_checkpoint_nothing_is_resumed(tmp_path: Path) -> None:
     (tmp_path / "step-0000004.pt").write_bytes(b"half")
     with pytest.raises(DataError, match=r"only damaged ones \(step-0000004.pt\)"):
         load_checkpoint(tmp_path)
+    with pytest.raises(DataError, match=r"found none\. Delete the folder of the run, or choose another --out"):
+        load_checkpoint(tmp_path / "none")
 
 
 def test_two_checkpoints_are_kept(tmp_path: Path) -> None:
@@ -171,13 +173,6 @@ def test_a_picture_that_breaks_after_reading_is_named_and_replaced(tmp_path: Pat
     assert {problem.path for problem in bad} == {broken}
 
 
-@pytest.mark.parametrize("split", ["train", "val"])
-def test_an_empty_split_is_an_error_in_one_line(data: LabelledData, tmp_path: Path, split: Any) -> None:
-    empty = LabelledData(data.classes, {**data.splits, split: ()}, ())
-    with pytest.raises(DataError, match=f"none in the split '{split}'"):
-        Trainer(_network(), empty, small_params(), tmp_path, 0)
-
-
 def test_a_loss_that_explodes_ends_the_run_with_advice(data: LabelledData, tmp_path: Path) -> None:
     network = _network()
     with torch.no_grad():
@@ -187,22 +182,27 @@ def test_a_loss_that_explodes_ends_the_run_with_advice(data: LabelledData, tmp_p
 
 
 @pytest.mark.parametrize(
-    ("fits", "advice"), [(5, "Set batch to 4, which fits, and accumulate to 4"), (0, "not even one picture")]
+    ("fits", "accumulate", "advice"),
+    [
+        (5, 1, "Set batch to 4, which fits, and accumulate to 4"),
+        (5, 3, "Set batch to 4, which fits, and accumulate to 12"),
+        (0, 1, "not even one picture"),
+    ],
 )
 @pytest.mark.parametrize("kind", [MemoryError, torch.OutOfMemoryError, "can't allocate memory: you tried"])
-def test_out_of_memory_says_which_batch_fits(fits: int, advice: str, kind: Any) -> None:
+def test_out_of_memory_says_which_batch_fits(fits: int, accumulate: int, advice: str, kind: Any) -> None:
     failure = RuntimeError(kind) if isinstance(kind, str) else kind()
 
     def attempt(pictures: int) -> None:
         if pictures > fits:
             raise failure
 
-    with pytest.raises(ConfigError, match=advice), saying_what_fits(16, attempt):
+    with pytest.raises(ConfigError, match=advice), saying_what_fits(16, accumulate, attempt):
         raise failure
 
 
 def test_other_errors_are_not_taken_for_a_lack_of_memory() -> None:
-    with pytest.raises(RuntimeError, match="shapes"), saying_what_fits(16, lambda _: None):
+    with pytest.raises(RuntimeError, match="shapes"), saying_what_fits(16, 1, lambda _: None):
         raise RuntimeError("shapes differ")
 
 

@@ -2,8 +2,13 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import weakref
 
 import pytest
+import torch
+
+from standoff.core.errors import ConfigError
+from standoff.training.run.memory import saying_what_fits
 
 _PROGRAM = """
 import resource, sys
@@ -29,3 +34,18 @@ def test_large_blocks_are_not_fetched_from_the_system_again_and_again() -> None:
         for how in ("kept", "returned")
     }
     assert faults["kept"] * 3 < faults["returned"]
+
+
+def test_what_a_failed_step_had_computed_is_let_go_before_smaller_ones_are_tried() -> None:
+    computed: list[weakref.ref[torch.Tensor]] = []
+
+    def fail() -> None:
+        activations = torch.ones(8)
+        computed.append(weakref.ref(activations))
+        raise MemoryError
+
+    def attempt(pictures: int) -> None:
+        assert computed[0]() is None
+
+    with pytest.raises(ConfigError, match="batch to 8"), saying_what_fits(16, 1, attempt):
+        fail()

@@ -4,26 +4,33 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
 import pytest
+import torch
 import yaml
 from tolerances import FLOAT32_BOX_PX
-from training.small_runs import CFG, CLASSES, small_params, write_data
+from training.small_runs import CFG, CLASSES, QUIET, small_params, write_data
 
 from standoff.core.errors import ConfigError, DataError, ModelError, OutputError
 from standoff.core.types import Frame
-from standoff.labels import read_data
+from standoff.labels import LabelledData, Problem, read_data
+from standoff.labels.read import CUT_GROUP
+from standoff.labels.splits import spread
 from standoff.stages.detect import DetectParams, OnnxDetector
 from standoff.stages.frames.pictures import ArrayPicture
-from standoff.training.darknet.cfg import read_cfg
-from standoff.training.darknet.network import DarknetNetwork
+from standoff.training.darknet.cfg import Yolo, parse_cfg, read_cfg
+from standoff.training.darknet.network import DarknetNetwork, DecodedNetwork
 from standoff.training.darknet.weights import load_weights
+from standoff.training.run.card import card_text
+from standoff.training.run.folder import RunFolder
+from standoff.training.run.loop import Progress
 from standoff.training.run.train import Listener, RunPlan, read_run, train_detector
-from standoff.training.run.validation import detect_pictures, spread
+from standoff.training.run.validation import detect_pictures, validate
 from standoff.training.start.starting_point import backbone_of, fill_network
 
 
@@ -128,10 +135,118 @@ def test_weights_of_another_architecture_are_refused_before_anything_is_written(
 
 def test_labels_without_a_box_cannot_give_anchors(tmp_path: Path) -> None:
     plan = _plan(tmp_path)
-    for path in (plan.data / "labels").rglob("*.txt"):
+    for path in (plan.data / "labels" / "train").iterdir():
         path.write_text("")
     with pytest.raises(DataError, match="labelled boxes with positive sides, to find anchors, found none"):
         train_detector(plan, tmp_path / "run", _Heard().listener())
+
+
+@pytest.mark.parametrize(
+    ("emptied", "told"),
+    [
+        ("images/val", r"found none in val\."),
+        ("images/train", r"found none in train\."),
+        ("labels/val", "boxes to validate with, found none in the 8 pictures"),
+    ],
+)
+def test_data_that_nothing_can_be_validated_with_is_refused_before_anything_is_made_of_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, emptied: str, told: str
+) -> None:
+    monkeypatch.delattr("standoff.training.run.train.near_duplicates")
+    plan = _plan(tmp_path)
+    kind, split = emptied.split("/")
+    if kind == "labels":
+        for path in (plan.data / emptied).iterdir():
+            path.write_text("")
+    else:
+        other = {"val": "train", "train": "val"}[split]
+        content = {other: f"images/{other}", "names": list(CLASSES)}
+        (plan.data / "data.yaml").write_text(yaml.safe_dump(content))
+    with pytest.raises(DataError, match=told):
+        train_detector(plan, tmp_path / "run", _Heard().listener())
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_run_that_was_killed_before_its_first_checkpoint_says_what_to_do(tmp_path: Path) -> None:
+    plan = _plan(tmp_path, steps=4, warmup_steps=1)
+    train_detector(plan, tmp_path / "run", _Heard().listener())
+    for path in (tmp_path / "run" / "checkpoints").iterdir():
+        path.unlink()
+    with pytest.raises(DataError, match="Delete the folder of the run, or choose another --out"):
+        train_detector(plan, tmp_path / "run", _Heard().listener(), resumes=True)
+
+
+def test_a_run_goes_on_only_with_its_classes_and_its_size(tmp_path: Path) -> None:
+    plan = _plan(tmp_path, steps=4, warmup_steps=1)
+    train_detector(plan, tmp_path / "run", _Heard().listener())
+    larger = RunPlan(plan.data, plan.arch, None, small_params(steps=4, warmup_steps=1, size_px=(128, 96)))
+    with pytest.raises(ConfigError, match=r"size_px 96x64, .* found 128x96"):
+        train_detector(larger, tmp_path / "run", _Heard().listener(), resumes=True)
+    names = plan.data / "data.yaml"
+    names.write_text(yaml.safe_dump({**yaml.safe_load(names.read_text()), "names": ["vehicle", "worker"]}))
+    with pytest.raises(ConfigError, match="worker, vehicle, found vehicle, worker in the data"):
+        train_detector(plan, tmp_path / "run", _Heard().listener(), resumes=True)
+
+
+def test_only_a_data_set_that_is_there_can_be_turned_freely(tmp_path: Path) -> None:
+    plan = _plan(tmp_path, augment=replace(QUIET, any_rotation_sources=("flights",)))
+    with pytest.raises(ConfigError, match=r"names of data sets \(blocks\) in any_rotation_sources, found flights"):
+        train_detector(plan, tmp_path / "run", _Heard().listener())
+
+
+def test_a_run_trains_on_from_another_whose_anchors_and_order_of_classes_differ(
+    finished: tuple[RunPlan, Path, _Heard],
+) -> None:
+    _, out, _ = finished
+    cfg = read_cfg(out / "network.cfg")
+    (anchors_px,) = (head.anchors_px for head in cfg.heads)
+    turned = parse_cfg((out / "network.cfg").read_text(), "turned.cfg")
+    turned = replace(
+        turned,
+        layers=tuple(
+            replace(layer, anchors_px=anchors_px[::-1]) if isinstance(layer, Yolo) else layer for layer in turned.layers
+        ),
+    )
+    source, _ = fill_network(cfg, CLASSES, out / "best.weights", seed=0)
+    network, transferred = fill_network(turned, CLASSES[::-1], out / "best.weights", seed=0)
+    assert (transferred.copied, transferred.resized) == ((0, 1, 2), (4,))
+    assert transferred.class_sources == (("vehicle",), ("worker",))
+    picture = torch.rand(1, 3, 64, 96, generator=torch.Generator().manual_seed(0))
+    with torch.no_grad():
+        expected, found = (DecodedNetwork(one).eval()(picture)[0].reshape(-1, 3, 7) for one in (source, network))
+    torch.testing.assert_close(found, expected.flip(1)[..., [0, 1, 2, 3, 4, 6, 5]])
+
+
+def test_the_first_steps_of_a_run_that_trains_on_may_freeze_its_backbone(
+    finished: tuple[RunPlan, Path, _Heard], tmp_path: Path
+) -> None:
+    plan, out, _ = finished
+    params = small_params(steps=4, warmup_steps=1, freeze_steps=2)
+    again = RunPlan(plan.data, str(out / "network.cfg"), out / "best.weights", params)
+    train_detector(again, tmp_path / "again", _Heard().listener())
+    assert json.loads((tmp_path / "again" / "start.json").read_text())["backbone_layers"] == 4
+
+
+def test_what_repeats_a_run_does_so_from_any_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    written = RunPlan(Path("data"), "nets/a.cfg", Path("a.weights"), small_params()).to_dict()
+    assert [written[name] for name in ("data", "arch", "weights")] == [
+        str(tmp_path / name) for name in ("data", "nets/a.cfg", "a.weights")
+    ]
+    assert RunPlan(Path("data"), "yolov3", None, small_params()).to_dict()["arch"] == "yolov3"
+
+
+def test_a_validation_of_which_nothing_can_be_shown_is_still_written(
+    finished: tuple[RunPlan, Path, _Heard], tmp_path: Path
+) -> None:
+    plan, out, heard = finished
+    network, _ = fill_network(read_cfg(out / "network.cfg"), CLASSES, None, seed=0)
+    pictures = read_data(plan.data).splits["val"]
+    score = validate(network, pictures, CLASSES, bf16=False)
+    lost = tuple(replace(picture, path=tmp_path / "gone.png") for picture in pictures)
+    progress = Progress(step=30, best_step=30, rows=heard.rows[:1])
+    RunFolder(tmp_path, CLASSES).write_validation(progress, score, network, lost, 0)
+    assert (tmp_path / "best.weights").is_file() and not (tmp_path / "predictions.jpg").exists()
 
 
 def test_problems_of_the_data_are_counted_and_named_once_a_kind(tmp_path: Path) -> None:
@@ -166,7 +281,8 @@ def test_the_backbone_is_what_the_weights_filled(finished: tuple[RunPlan, Path, 
     _, out, _ = finished
     cfg = read_cfg(out / "network.cfg")
     network, transferred = fill_network(cfg, CLASSES, out / "best.weights", seed=0)
-    assert backbone_of(network, transferred) == len(cfg.layers)
+    assert transferred.copied == (0, 1, 2, 4)
+    assert backbone_of(network, transferred) == 4  # the head is not part of it: something must be left to train
     network, transferred = fill_network(cfg, CLASSES, None, seed=0)
     assert backbone_of(network, transferred) == 0
 
@@ -183,6 +299,15 @@ def test_the_card_says_how_to_repeat_the_run(finished: tuple[RunPlan, Path, _Hea
     card = (out / "model-card.md").read_text()
     repeated = yaml.safe_load(card.split("```yaml\n")[1].split("```")[0])
     assert repeated == plan.to_dict()
+
+
+def test_the_card_says_so_where_scenes_are_in_two_splits(finished: tuple[RunPlan, Path, _Heard]) -> None:
+    plan, _, heard = finished
+    data, progress = read_data(plan.data), Progress(rows=heard.rows)
+    assert "never in two splits" in card_text(plan.to_dict(), data, progress)
+    cut = Problem(plan.data, "'scene3' is in train and val", CUT_GROUP, skipped_picture=False)
+    card = card_text(plan.to_dict(), LabelledData(data.classes, data.splits, [cut]), progress)
+    assert "in two splits: 1, first 'scene3' is in train and val" in card and "never" not in card
 
 
 def test_a_half_model_that_is_refused_does_not_end_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

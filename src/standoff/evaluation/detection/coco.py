@@ -21,7 +21,7 @@ HEIGHT_BANDS_PX = ((8.0, 15.0), (15.0, 30.0), (30.0, 60.0), (60.0, float("inf"))
 
 _AREAS_PX2 = ((0.0, 1e10), (0.0, 32.0**2), (32.0**2, 96.0**2), (96.0**2, 1e10))
 """All, small, medium, large, as COCO has them."""
-_MOST_DETECTIONS = 100
+MOST_OF_A_CLASS = 100
 _EVERY_IOU = np.linspace(0.5, 0.95, 10)
 _AP50, _AP75 = 0, 5
 
@@ -211,7 +211,7 @@ def _average_precisions(
         evaluation.params.iouThrs = ious
         evaluation.params.areaRng = [list(area) for area in areas]
         evaluation.params.areaRngLbl = [str(number) for number in range(len(areas))]
-        evaluation.params.maxDets = [_MOST_DETECTIONS]
+        evaluation.params.maxDets = [MOST_OF_A_CLASS]
         evaluation.evaluate()
         evaluation.accumulate()
     precision: FloatArray = evaluation.eval["precision"][..., 0]

@@ -14,7 +14,7 @@ from standoff.core.errors import OutputError
 from standoff.core.homography import FloatArray
 from standoff.evaluation.detection.comparison import Comparison
 from standoff.evaluation.detection.score import PRECISION, ClassScore
-from standoff.stages.sinks.folder import partial_path
+from standoff.stages.sinks.whole import whole_file
 
 SERIES_COLOURS = ("#1f5f8b", "#c0562f", "#3a7d44", "#7a4fa3", "#b38600", "#2b8f8f", "#a33a5b", "#5b5b5b")
 INK, QUIET, GRID = "#222222", "#6b6b6b", "#ececec"
@@ -46,13 +46,13 @@ def write_figures(comparison: Comparison, folder: Path) -> tuple[Path, ...]:
     }
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        for name, figure in drawn.items():
-            partial = partial_path(folder / name)
-            figure.savefig(partial, format="png")
-            partial.replace(folder / name)
     except OSError as error:
         fix = "choose another folder or give write permission"
-        raise OutputError(expected=f"to write figures to {folder}", found=str(error.strerror), fix=fix) from error
+        found = error.strerror or str(error)
+        raise OutputError(expected=f"to write figures to {folder}", found=found, fix=fix) from error
+    for name, figure in drawn.items():
+        with whole_file(folder / name) as path:
+            figure.savefig(path, format="png")
     return tuple(folder / name for name in drawn)
 
 

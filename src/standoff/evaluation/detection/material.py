@@ -16,13 +16,12 @@ from standoff.evaluation.paper.clip import Clip, load_clip
 from standoff.evaluation.paper.clip_tables import read_table
 from standoff.evaluation.positions_input import read_truth
 from standoff.labels import load_picture, read_data
+from standoff.labels.marking import would_be_marked
 from standoff.labels.site_classes import to_site_classes
 from standoff.labels.types import LabelledPicture, Split
 from standoff.stages.frames import frame_from_array, open_source
 
 _VISIBLE = ("frame", "entity_id", "class_id", "x1_px", "y1_px", "x2_px", "y2_px", "visible_share", "visible_px")
-_LEAST_SHARE, _LEAST_PX, _PLAIN_PX = 0.15, 16, 1500
-"""Of an entity: hidden more than that and small, or smaller than that, it is ignored, as nobody would mark it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,8 +88,7 @@ def simulated_clip(folder: Path, limit: int | None = None) -> Material:
     rows = read_table(folder / "truth.parquet", _VISIBLE)
     seen = rows["visible_px"] > 0
     boxes_px = np.column_stack([rows[name] for name in ("x1_px", "y1_px", "x2_px", "y2_px")]).astype(np.float64)
-    hidden = (rows["visible_share"] < _LEAST_SHARE) & (rows["visible_px"] < _PLAIN_PX)
-    ignored = hidden | (rows["visible_px"] < _LEAST_PX)
+    ignored = ~would_be_marked(boxes_px, rows["visible_px"], rows["visible_share"])
     chosen = _spread(clip.frame_count, limit)
     size_px = _size_px(clip.video)
     truth = []
@@ -116,7 +114,8 @@ def video_with_people(
         SourceError: The video cannot be read.
     """
     rows = read_truth(csv)
-    first, last = frames or (int(rows["frame"].min(initial=1)), int(rows["frame"].max(initial=1)))
+    told = rows["frame"] if len(rows["frame"]) else np.ones(1)
+    first, last = frames or (int(told.min()), int(told.max()))
     inside = (rows["frame"] >= first) & (rows["frame"] <= last) & np.isfinite(rows["x"])
     if not (inside & (rows["conf"] > 0)).any():
         raise DataError(

@@ -10,11 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from standoff.core.classes import CLASSES
 from standoff.core.errors import DataError
 from standoff.core.homography import FloatArray
 from standoff.core.protocols import Detector
 from standoff.core.types import Detections
-from standoff.evaluation.detection.coco import CocoFigures, coco_figures
+from standoff.evaluation.detection.coco import MOST_OF_A_CLASS, CocoFigures, coco_figures
 from standoff.evaluation.detection.grouping import Grouping
 from standoff.evaluation.detection.localisation import ale_by_class_m
 from standoff.evaluation.detection.material import Material
@@ -46,7 +47,11 @@ class Candidate:
         Raises:
             ModelError: It is no detector.
         """
-        return OnnxDetector(self.model, DetectParams(score_threshold=LEAST_SCORE, slices=self.slices))
+        # As many boxes as COCO asks for, were all of one picture's of each class.
+        most = MOST_OF_A_CLASS * len(CLASSES)
+        return OnnxDetector(
+            self.model, DetectParams(score_threshold=LEAST_SCORE, slices=self.slices, max_detections=most)
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -23,7 +23,7 @@ from standoff.evaluation.paper.pairs import AFTER, BEFORE, PairSeries
 from standoff.evaluation.paper.rectified import failed_frames
 from standoff.evaluation.paper.result import ClipResult
 from standoff.evaluation.paper.snapshots import Snapshot
-from standoff.stages.sinks.folder import partial_path
+from standoff.stages.sinks.whole import whole_file
 
 MOST_CHARTS = 4
 
@@ -44,12 +44,11 @@ def write_report(
     path = Path(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        partial = partial_path(path)
-        partial.write_text(render(results, failures or {}), encoding="utf-8")
-        partial.replace(path)
     except OSError as error:
         found = f"{path}: {error.strerror or error}"
         raise OutputError(expected="a report to write", found=found, fix="choose another path") from error
+    with whole_file(path) as partial:
+        partial.write_text(render(results, failures or {}), encoding="utf-8")
 
 
 def render(results: Sequence[ClipResult], failures: Mapping[str, Exception]) -> str:

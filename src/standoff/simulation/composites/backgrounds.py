@@ -2,38 +2,48 @@
 
 from __future__ import annotations
 
-import os
-import re
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, get_args
 
 import numpy as np
 import yaml
-from PIL import Image
 
 from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.errors import DataError
 from standoff.core.homography import FloatArray
 from standoff.core.types import IntArray
-from standoff.labels.regions import read_regions
+from standoff.labels.documents import check_types, resolve_path
+from standoff.labels.mixture import IGNORE
+from standoff.labels.pictures import find_pictures, read_size_px
+from standoff.labels.regions import corners_of, read_regions
+from standoff.labels.source import BadPicture
+from standoff.labels.splits import flight_of
 from standoff.labels.types import Split
+from standoff.labels.yolo import read_boxes
 from standoff.simulation.presets import Condition
 
-_SUFFIXES = (".jpg", ".jpeg", ".png")
 _CAR_M = 4.6
 _DAYLIGHT: tuple[Condition, ...] = ("noon", "afternoon", "hazy", "overcast")
 _PITCHES_DEG = {"nadir": 90.0, "oblique": 40.0}
-_IGNORE = "ignore"
 _NOWHERE = np.empty((0, 4))
-_KEYS = frozenset(
+_TYPES: Mapping[str, tuple[type, ...]] = MappingProxyType(
     {
-        "pictures", "view", "pitch_deg", "px_per_m", "light", "shadow_deg", "labels", "ignore_px", "ignore_regions",
-        "group",
+        "pictures": (str,),
+        "view": (str,),
+        "pitch_deg": (int, float),
+        "px_per_m": (int, float),
+        "light": (list,),
+        "shadow_deg": (int, float),
+        "labels": (dict,),
+        "ignore_px": (list,),
+        "ignore_regions": (str,),
+        "group": (str,),
     }
-)  # fmt: skip
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,15 +100,6 @@ def find_backgrounds(sources: Sequence[str]) -> tuple[Background, ...]:
     return tuple(found)
 
 
-def group_of(path: Path) -> str:
-    """Return the flight that a photograph belongs to: its name less the last number.
-
-    >>> [group_of(Path(name)) for name in ("DJI_0005-0018.jpg", "DJI_0031.JPG", "MOS76.png", "7.png")]
-    ['DJI_0005', 'DJI', 'MOS', 'photographs']
-    """
-    return re.sub(r"[-_ .]*\d+$", "", path.stem) or "photographs"
-
-
 def split_backgrounds(backgrounds: Sequence[Background], held_out: float) -> dict[Split, tuple[Background, ...]]:
     """Divide the flights among train, val and test: the smallest are held out, so that training sees most ground.
 
@@ -125,7 +126,7 @@ def split_backgrounds(backgrounds: Sequence[Background], held_out: float) -> dic
 def _below(folder: Path) -> list[Path]:
     if not folder.is_dir():
         raise DataError(expected="a folder of photographs", found=f"no folder {folder}", fix="check the path")
-    return sorted(path for path in folder.rglob("*") if path.suffix.lower() in _SUFFIXES)
+    return find_pictures(folder)
 
 
 def _listed(file: Path) -> list[Background]:
@@ -138,34 +139,34 @@ def _listed(file: Path) -> list[Background]:
     if not isinstance(entries, list):
         raise DataError(expected="a YAML list of backgrounds", found=f"another thing in {file}", fix="begin with '- '")
     found: list[Background] = []
-    for entry in entries:
-        paths = _matching(file.parent, str(entry.get("pictures", "")))
+    for number, entry in enumerate(entries, start=1):
+        where = f"entry {number} of {file}"
+        if not isinstance(entry, dict):
+            raise DataError(expected=f"`pictures: PATTERN` in {where}", found=repr(entry), fix="see docs/simulator.md")
+        check_types(entry, _TYPES, where)
+        paths = _matching(file.parent, entry.get("pictures", ""))
         if not paths:
             raise DataError(expected="photographs under `pictures`", found=f"none in {file}", fix="check the pattern")
         found += _described(paths, entry, file)
     return found
 
 
-def _near(folder: Path, name: str) -> Path:
-    return folder / Path(os.path.expandvars(name)).expanduser()
-
-
 def _matching(folder: Path, pattern: str) -> list[Path]:
-    path = _near(folder, pattern)
+    path = resolve_path(pattern, folder)
     return sorted(path.parent.glob(path.name)) if pattern else []
 
 
 def _described(paths: Sequence[Path], entry: Mapping[str, Any], source: Path) -> list[Background]:
-    unknown = sorted(set(entry) - _KEYS)
     view, light = entry.get("view", "nadir"), tuple(entry.get("light", _DAYLIGHT))
-    wrong = unknown + [view] * (view not in _PITCHES_DEG) + [name for name in light if name not in get_args(Condition)]
+    wrong = [view] * (view not in _PITCHES_DEG) + [name for name in light if name not in get_args(Condition)]
+    wrong += [name for name in [entry.get("group", "")] if "/" in name]
     if wrong:
         raise DataError(
-            expected=f"{', '.join(sorted(_KEYS))}; views {', '.join(_PITCHES_DEG)}; light {get_args(Condition)}",
+            expected=f"views {', '.join(_PITCHES_DEG)}; light {get_args(Condition)}; a group without /",
             found=f"{', '.join(map(repr, wrong))} in {source}",
             fix="correct it",
         )
-    regions = read_regions(_near(source.parent, entry["ignore_regions"])) if "ignore_regions" in entry else {}
+    regions = read_regions(resolve_path(entry["ignore_regions"], source.parent)) if "ignore_regions" in entry else {}
     known = {**entry, "pitch_deg": float(entry.get("pitch_deg", _PITCHES_DEG[view]))}
     return [_background(path, known, light, regions.get(path.stem, _NOWHERE)) for path in paths]
 
@@ -174,42 +175,38 @@ def _background(
     path: Path, entry: Mapping[str, Any], light: tuple[Condition, ...], regions_px: FloatArray
 ) -> Background:
     xyxy_px, ids = np.empty((0, 4)), np.empty(0, np.int64)
-    ignored_px = np.concatenate([np.array(entry.get("ignore_px", []), dtype=np.float64).reshape(-1, 4), regions_px])
+    ignored_px = corners_of(entry.get("ignore_px", []))
+    if ignored_px is None:
+        raise DataError(
+            expected="`ignore_px` as [[x1, y1, x2, y2], ...]", found=f"{entry['ignore_px']}", fix="correct it"
+        )
+    ignored_px = np.concatenate([ignored_px, regions_px])
     px_per_m = entry.get("px_per_m")
     if entry.get("labels"):
         boxes_px, names = _read_labels(path, entry["labels"])
-        ignored = np.array([name == _IGNORE for name in names], dtype=bool)
+        ignored = np.array([name == IGNORE for name in names], dtype=bool)
         ignored_px = np.concatenate([ignored_px, boxes_px[ignored]])
         xyxy_px = boxes_px[~ignored]
-        ids = np.array([CLASS_BY_NAME[name].id for name in names if name != _IGNORE], dtype=np.int64)
+        ids = np.array([CLASS_BY_NAME[name].id for name in names if name != IGNORE], dtype=np.int64)
         cars = xyxy_px[ids == CLASS_BY_NAME["vehicle"].id]
         if px_per_m is None and len(cars):
             px_per_m = float(np.median((cars[:, 2:] - cars[:, :2]).max(axis=1))) / _CAR_M
-    group = str(entry.get("group", group_of(path)))
-    return Background(
-        path, group, entry["pitch_deg"], px_per_m, light, entry.get("shadow_deg"), xyxy_px, ids, ignored_px
-    )
+    group, shadow_deg = entry.get("group", flight_of(path)), entry.get("shadow_deg")
+    return Background(path, group, entry["pitch_deg"], px_per_m, light, shadow_deg, xyxy_px, ids, ignored_px)
 
 
 def _read_labels(path: Path, names: Mapping[int, str]) -> tuple[FloatArray, list[str]]:
-    """Return the boxes (N, 4) of a YOLO label file beside `images/`, and what each is."""
-    file = path.parent.parent / "labels" / path.with_suffix(".txt").name
-    if not file.is_file():
-        raise DataError(expected="a photograph with a label file", found=f"no {file} to {path}", fix="check the folder")
-    size_px = _size_px(path)
-    rows = np.array([line.split()[:5] for line in file.read_text().splitlines() if line.strip()], dtype=np.float64)
-    rows = rows.reshape(-1, 5)
-    unknown = set(rows[:, 0].astype(int).tolist()) - set(names)
-    if unknown or not set(names.values()) <= {*CLASS_BY_NAME, _IGNORE}:
+    """Return the boxes (N, 4) of a photograph's YOLO label file, and what each is."""
+    try:
+        numbers, xyxy_px = read_boxes(path, read_size_px(path))
+    except BadPicture as error:
         raise DataError(
-            expected=f"for each class of {file} one of {', '.join(CLASS_BY_NAME)} or {_IGNORE}",
+            expected=f"a photograph with labels in {path}", found=str(error), fix="check the folder"
+        ) from error
+    if not set(numbers.tolist()) <= set(names) or not set(names.values()) <= {*CLASS_BY_NAME, IGNORE}:
+        raise DataError(
+            expected=f"for each class that {path} shows one of {', '.join(CLASS_BY_NAME)} or {IGNORE}",
             found=f"{dict(names)}",
             fix="name them under `labels`",
         )
-    centre, half = rows[:, 1:3] * size_px, rows[:, 3:] * size_px / 2
-    return np.hstack([centre - half, centre + half]) - 0.5, [names[int(kind)] for kind in rows[:, 0]]
-
-
-def _size_px(path: Path) -> FloatArray:
-    with Image.open(path) as picture:
-        return np.array(picture.size, dtype=np.float64)
+    return xyxy_px, [names[int(number)] for number in numbers]

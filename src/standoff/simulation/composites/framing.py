@@ -75,7 +75,7 @@ def frame(rng: np.random.Generator, background: Background, size_px: tuple[int, 
     Raises:
         DataError: The file is not a picture.
     """
-    photo = cv2.imread(str(background.path), cv2.IMREAD_COLOR)
+    photo = cv2.imread(str(background.path), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
     if photo is None:
         raise DataError(expected="a photograph", found=f"{background.path}", fix="remove it from the backgrounds")
     if rng.random() < 0.5:

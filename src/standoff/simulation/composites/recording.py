@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Sequence
 from contextlib import closing, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -25,7 +25,7 @@ from standoff.simulation.crew import work_through
 from standoff.simulation.flight import Still
 from standoff.simulation.light import random_light
 from standoff.simulation.moment import Moment, scene_at
-from standoff.simulation.picture_set import Picture, PictureSet, draw_split, is_marked
+from standoff.simulation.picture_set import SET_FILES, Picture, PictureSet, draw_split, is_marked
 from standoff.simulation.presets import Condition, check_seed, check_size
 from standoff.simulation.render import Cutout, Renderer
 from standoff.simulation.scene import Light, Scene
@@ -103,7 +103,7 @@ def record_composites(
         MissingDependency: No OpenGL.
     """
     splits = split_backgrounds(find_backgrounds(plan.backgrounds), plan.held_out)
-    with whole_folder(out, overwrite=overwrite) as folder:
+    with whole_folder(out, overwrite=overwrite, own=SET_FILES) as folder:
         pictures = PictureSet(folder, "yolo")
         jobs = range(plan.images)
         made = work_through(partial(open_compositor, plan), jobs, processes=min(processes, len(jobs)))
@@ -113,7 +113,7 @@ def record_composites(
                 if on_picture is not None:
                     on_picture()
         flights = {split: sorted({b.group for b in backgrounds}) for split, backgrounds in splits.items()}
-        pictures.finish("", {"images": plan.images, "seed": plan.seed, "flights": flights})
+        pictures.finish("", {**asdict(plan), "flights": flights})
 
 
 @contextmanager

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Generator
+from collections.abc import Collection, Generator
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -32,41 +32,59 @@ def whole_file(out: Path) -> Generator[Path, None, None]:
 
 
 @contextmanager
-def whole_folder(out: Path, *, overwrite: bool) -> Generator[Path, None, None]:
+def whole_folder(out: Path, *, overwrite: bool, own: Collection[str]) -> Generator[Path, None, None]:
     """Give a folder to write to that becomes `out` when the block ends well, and vanishes otherwise.
 
     Killed without a chance to tidy up, it leaves `.NAME.partial` beside `out`, which nothing takes for a result;
     the next attempt removes it.
 
     Args:
-        out: The folder to be; parents are created.
-        overwrite: Replace a folder that has files in it.
+        out: The folder to be; parents are created. A link is followed.
+        overwrite: Replace a folder that holds an earlier result.
+        own: Names of what a result may hold at its top. A folder with anything else is never replaced.
 
     Raises:
-        OutputError: `out` is a file, has files in it, or cannot be written.
+        OutputError: `out` is a file, has files in it, is the current folder, or cannot be written.
     """
+    out = out.resolve()
     if out.exists() and not out.is_dir():
         raise OutputError(expected="an output folder", found=f"the file {out}", fix="choose another folder")
-    if out.is_dir() and any(out.iterdir()) and not overwrite:
+    held = sorted(path.name for path in out.iterdir()) if out.is_dir() else []
+    foreign = [name for name in held if name not in own]
+    if foreign or (held and not overwrite):
         raise OutputError(
             expected="a new or empty output folder",
-            found=f"files in {out}",
-            fix="choose another one or pass --overwrite",
+            found=f"{', '.join((foreign or held)[:3])} in {out}",
+            fix="choose another one" if foreign else "choose another one or pass --overwrite",
         )
-    staging = out.parent / f".{out.name}.partial"
+    if out == Path.cwd():
+        raise OutputError(
+            expected="an output folder that can be put in place as a whole",
+            found=f"the current folder, {out}",
+            fix="name a folder in it",
+        )
+    staging, older = (out.parent / f".{out.name}.{end}" for end in ("partial", "older"))
     try:
         shutil.rmtree(staging, ignore_errors=True)
         staging.mkdir(parents=True)
     except OSError as error:
-        raise OutputError(
-            expected="an output folder that can be written to",
-            found=f"{out} ({error.strerror or error})",
-            fix="choose another folder or make room and give write permission",
-        ) from error
+        raise _not_writable(out, error) from error
     try:
         yield staging
         if out.exists():
-            shutil.rmtree(out)
+            shutil.rmtree(older, ignore_errors=True)
+            out.replace(older)
         staging.replace(out)
+        shutil.rmtree(older, ignore_errors=True)
+    except OSError as error:
+        raise _not_writable(out, error) from error
     finally:
         shutil.rmtree(staging, ignore_errors=True)
+
+
+def _not_writable(out: Path, error: OSError) -> OutputError:
+    return OutputError(
+        expected="an output folder that can be written to",
+        found=f"{out} ({error.strerror or error})",
+        fix="choose another folder or make room and give write permission",
+    )

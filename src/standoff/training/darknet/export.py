@@ -46,7 +46,7 @@ def export_darknet(
         network = replace(network, width_px=size_px[0], height_px=size_px[1])
     check_input(network)
     card = ModelCard(
-        classes=_read_names(names, network),
+        classes=read_names(names, network),
         anchors_px=tuple(head.anchors_px for head in network.heads),
         input_size_px=(network.width_px, network.height_px),
         sources={path.name: file_sha256(path) for path in (cfg, weights, names) if path.is_file()},
@@ -60,7 +60,12 @@ def export_darknet(
     return card
 
 
-def _read_names(path: Path, network: DarknetCfg) -> tuple[str, ...]:
+def read_names(path: Path, network: DarknetCfg) -> tuple[str, ...]:
+    """Read a names file, one class a line.
+
+    Raises:
+        ModelError: It cannot be read, or has another number of names than the network has classes.
+    """
     lines = read_text(path, "a names file").splitlines()
     names = tuple(line.strip() for line in lines if line.strip())
     classes = network.heads[0].classes

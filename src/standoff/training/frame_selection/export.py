@@ -32,6 +32,8 @@ _DEFAULT_EVERY_S = 1.0
 """Between candidates where the source does not tell how long it is."""
 _JPEG_QUALITY = 95
 _PICTURES = "images"
+LABEL_FILES = (_PICTURES, "coco.json", "label_studio.json", "contact_sheet.png")
+"""What the folder holds."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,11 +1,14 @@
 """Settings of the augmentation: how drone pictures differ from those at hand."""
 
 import math
-from dataclasses import dataclass, fields
-from typing import Annotated, Final, get_args
+from dataclasses import dataclass, fields, replace
+from typing import Annotated, Final, Self, get_args
 
 from annotated_types import Ge, Gt, Interval
 from typing_extensions import Doc
+
+from standoff.core.errors import ModelError
+from standoff.stages.detect.class_map import map_classes
 
 Chance = Annotated[float, Interval(ge=0, le=1)]
 Range = tuple[float, float]
@@ -38,7 +41,10 @@ class AugmentParams:
 
     aim: Annotated[Chance, Doc("Chance that a view is aimed at an object, rather than anywhere.")] = 0.85
     whole: Annotated[Chance, Doc("Chance that the whole picture is shown instead, as in use.")] = 0.15
-    person_classes: Annotated[tuple[int, ...], Doc("Class ids of people, whose size is drawn by their height.")] = (0,)
+    person_classes: Annotated[
+        tuple[int, ...] | None,
+        Doc("Class ids of people, whose size is drawn by their height; null: those whose names mean a worker."),
+    ] = None
     person_height_px: Annotated[Range, Doc("Height of a person that a view is aimed at; log-uniform.")] = (8.0, 80.0)
     other_side_px: Annotated[Range, Doc("Longer side of anything else that a view is aimed at; log-uniform.")] = (
         16.0,
@@ -93,6 +99,21 @@ class AugmentParams:
     noise_levels: Annotated[Range, Doc("Standard deviation of the noise, of 255 levels.")] = (1.0, 9.0)
     jpeg: Annotated[Chance, Doc("Chance of JPEG compression.")] = 0.4
     jpeg_quality: Annotated[tuple[int, int], Doc("Its quality.")] = (25, 95)
+
+    def for_classes(self, classes: tuple[str, ...]) -> Self:
+        """Return the settings with the class ids of people filled in.
+
+        >>> AugmentParams().for_classes(("car", "Pedestrian")).person_classes
+        (1,)
+        """
+        if self.person_classes is not None:
+            return self
+        try:
+            site_names = map_classes(classes, {}, "the data")
+        except ModelError:  # no class of the site
+            site_names = {}
+        people = tuple(number for number, name in enumerate(classes) if site_names.get(name) == "worker")
+        return replace(self, person_classes=people)
 
     def __post_init__(self) -> None:
         for setting in fields(self):

@@ -157,7 +157,7 @@ def _draw_zoom(
     if target is None:
         return log_uniform(rng, (least, max(least, 1.0)))
     width_px, height_px = picture.xyxy_px[target, 2:] - picture.xyxy_px[target, :2]
-    if picture.class_id[target] in params.person_classes:
+    if picture.class_id[target] in (params.person_classes or ()):
         wanted = log_uniform(rng, params.person_height_px) / height_px
     else:
         wanted = log_uniform(rng, params.other_side_px) / max(width_px, height_px)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -16,6 +16,7 @@ from typing_extensions import Doc
 
 from standoff.core.errors import DataError, ModelError
 from standoff.labels import LabelledData, LabelledPicture, Split, load_picture
+from standoff.labels.splits import spread
 from standoff.stages.detect.letterbox import Letterbox
 from standoff.stages.frames import frame_from_array
 from standoff.stages.sinks.whole import whole_file
@@ -141,7 +142,9 @@ def quantize_model(
     proto, card = read_own_model(model)
     if is_quantized(proto):
         raise ModelError(expected=f"a float model in {model.name}", found="an int8 model", fix="give the float model")
-    calibrating, deciding = divide_pictures(data, plan)
+    chosen, deciding = divide_pictures(data, plan)
+    with progress("pictures to calibrate with", len(chosen)) as step:
+        calibrating = _readable(chosen, step)
     with whole_file(out) as path:
         with progress("float model", len(deciding)) as step:
             gate = Gate(model, deciding, step)
@@ -201,8 +204,28 @@ def divide_pictures(
             found=counts,
             fix="choose another --split, or add pictures",
         )
-    every = max(1, len(calibrating) // plan.calibration_pictures)
-    return calibrating[::every][: plan.calibration_pictures], deciding
+    return spread(calibrating, plan.calibration_pictures), deciding
+
+
+def _readable(pictures: Sequence[LabelledPicture], step: Step) -> tuple[LabelledPicture, ...]:
+    """Return the pictures that can be decoded.
+
+    Raises:
+        DataError: None can.
+    """
+    readable = []
+    for picture in pictures:
+        step()
+        with suppress(DataError):
+            load_picture(picture)
+            readable.append(picture)
+    if not readable:
+        raise DataError(
+            expected="pictures to calibrate with that can be decoded",
+            found=f"none of {len(pictures)}",
+            fix="check the files",
+        )
+    return tuple(readable)
 
 
 class _Search:
@@ -235,7 +258,7 @@ class _Search:
         best, heads = self._best().recipe.method, self.network.heads
         yield Recipe(best, heads, f"{best} calibration, last convolutions in float")
         with self._progress("harm of each layer", len(self.network.layers)) as step:
-            few = list(_inputs(pictures[:_HARM_PICTURES], input_size_px, _no_step))
+            few = list(_inputs(spread(pictures, _HARM_PICTURES), input_size_px, _no_step))
             order = self.network.by_harm(self._ranges[best], few, step)
         for share in _FLOAT_SHARES:
             harmful = order[: math.ceil(share * len(order))]
@@ -260,13 +283,10 @@ class _Search:
 
 
 def _inputs(pictures: Sequence[LabelledPicture], input_size_px: tuple[int, int], step: Step) -> Iterator[NetworkInput]:
-    """Lay pictures into network inputs as the detector does; those that cannot be decoded are left out."""
+    """Lay pictures into network inputs as the detector does."""
     for picture in pictures:
         step()
-        try:
-            image = load_picture(picture)
-        except DataError:
-            continue
+        image = load_picture(picture)
         letterbox = Letterbox.fit(picture.size_px, input_size_px)
         resized = frame_from_array(image).picture.resized_bgr(*letterbox.inner_size_px)
         yield letterbox.network_input(resized)

@@ -7,6 +7,7 @@ from typing import Any
 import yaml
 
 from standoff.labels import LabelledData, Split
+from standoff.labels.read import CUT_GROUP
 from standoff.labels.summary import SplitSummary, summarise
 from standoff.stages.sinks.json_text import plain
 from standoff.training.run.loop import Progress
@@ -32,7 +33,7 @@ Classes: {", ".join(data.classes)}.
 |---|---|---|{"---|" * len(data.classes)}
 {counts}
 
-Groups (scenes, flights, videos) are never in two splits.
+{_about_groups(data)}
 
 ## Accuracy on the validation split, by step
 
@@ -50,6 +51,13 @@ How the detector does on sites, seasons, machines and cameras that the data does
 ```yaml
 {yaml.safe_dump(plain(configuration), sort_keys=False)}```
 """
+
+
+def _about_groups(data: LabelledData) -> str:
+    cut = [problem.found for problem in data.problems if problem.kind == CUT_GROUP]
+    if not cut:
+        return "Groups (scenes, flights, videos) are never in two splits."
+    return f"Groups (scenes, flights, videos) in two splits: {len(cut)}, first {cut[0]}. That makes figures too good."
 
 
 def _row(split: Split, summary: SplitSummary) -> str:

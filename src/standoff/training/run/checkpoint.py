@@ -54,4 +54,5 @@ def load_checkpoint(folder: Path) -> tuple[dict[str, Any], tuple[str, ...]]:
             continue
         return state, tuple(damaged)
     found = f"only damaged ones ({', '.join(damaged)})" if damaged else "none"
-    raise DataError(expected=f"a checkpoint in {folder}", found=found, fix="start the training anew without --resume")
+    fix = "delete the folder of the run, or choose another --out"
+    raise DataError(expected=f"a checkpoint in {folder}", found=found, fix=fix)

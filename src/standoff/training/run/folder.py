@@ -10,13 +10,16 @@ from typing import Any, Final
 import yaml
 
 from standoff import __version__
+from standoff.config import read_settings_file
 from standoff.core.errors import ConfigError, OutputError
 from standoff.evaluation.detection import DetectionScore
 from standoff.labels import LabelledPicture
 from standoff.labels.documents import read_json
-from standoff.stages.sinks.folder import partial_path
+from standoff.labels.splits import spread
 from standoff.stages.sinks.json_text import plain, write_json
-from standoff.training.darknet.export import export_darknet
+from standoff.stages.sinks.whole import whole_file
+from standoff.training.darknet.cfg import read_cfg
+from standoff.training.darknet.export import export_darknet, read_names
 from standoff.training.darknet.network import DarknetNetwork
 from standoff.training.darknet.weights import WeightsHeader, save_weights
 from standoff.training.quantization.half_precision import store_half
@@ -79,9 +82,10 @@ class RunFolder:
             self.path.mkdir(parents=True, exist_ok=True)
             self._write_text("network.cfg", cfg_text)
             self._write_text("classes.names", "\n".join(self.classes) + "\n")
-            self._write_text("run.yaml", yaml.safe_dump(plain(configuration), sort_keys=False))
             write_json(self.path / "start.json", {"standoff": __version__, **facts})
             save_weights(network, self.path / "start.weights")
+            # The last: where it is, the others are.
+            self._write_text("run.yaml", yaml.safe_dump(plain(configuration), sort_keys=False))
         except OSError as error:
             raise OutputError(
                 expected=f"to write to {self.path}", found=str(error.strerror), fix="choose a folder that is writable"
@@ -94,6 +98,14 @@ class RunFolder:
             DataError: They are not there.
         """
         return read_json(self.path / "start.json")
+
+    def read_classes(self) -> tuple[str, ...]:
+        """Read the names that the run was started with.
+
+        Raises:
+            ModelError: They are not there, or do not belong to the network.
+        """
+        return read_names(self.path / "classes.names", read_cfg(self.cfg))
 
     def write_validation(
         self,
@@ -120,9 +132,9 @@ class RunFolder:
         if progress.best_step == progress.step:
             save_weights(network, self.best_weights, header)
             write_json(self.path / "best.json", {"step": progress.step, **score.to_dict()})
-            shown = pictures[:: max(1, len(pictures) // _SHOWN_PICTURES)][:_SHOWN_PICTURES]
-            readable, found = detect_pictures(network, shown, bf16=False)
-            self._write("predictions.jpg", lambda path: draw_predictions(readable, found, self.classes, path))
+            readable, found = detect_pictures(network, spread(pictures, _SHOWN_PICTURES), bf16=False)
+            if readable:
+                self._write("predictions.jpg", lambda path: draw_predictions(readable, found, self.classes, path))
 
     def write_model(self) -> None:
         """Export the best weights as ONNX."""
@@ -144,26 +156,24 @@ class RunFolder:
         self._write(name, lambda path: path.write_text(text, encoding="utf-8"))
 
     def _write(self, name: str, write: Callable[[Path], object]) -> None:
-        partial = partial_path(self.path / name)
-        write(partial)
-        partial.replace(self.path / name)
+        with whole_file(self.path / name) as path:
+            write(path)
 
 
 def read_run(folder: Path) -> dict[str, Any]:
     """Read what a run was started with.
 
     Raises:
-        ConfigError: There is no run in the folder.
+        ConfigError: There is no run in the folder, or its record is damaged.
     """
     path = folder / "run.yaml"
     if not path.is_file():
         raise ConfigError(
-            expected=f"a training run to go on with in {folder}", found="no run.yaml", fix="start it without --resume"
+            expected=f"a training run to go on with in {folder}",
+            found="no run.yaml",
+            fix="start one without --resume, in a new or empty folder",
         )
-    loaded = yaml.safe_load(path.read_text(encoding="utf-8"))
-    if not isinstance(loaded, dict):
-        raise ConfigError(expected=f"settings in {path}", found="none", fix="start the run anew without --resume")
-    return loaded
+    return read_settings_file(path)
 
 
 def refuse_used(folder: Path) -> None:

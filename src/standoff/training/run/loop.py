@@ -15,6 +15,7 @@ from torch import Tensor, nn
 from standoff.core.errors import DataError
 from standoff.evaluation.detection import DetectionScore
 from standoff.labels import LabelledData, Problem
+from standoff.labels.splits import spread
 from standoff.training.darknet.network import DarknetNetwork
 from standoff.training.darknet.shapes import largest_stride
 from standoff.training.pictures.batches import Batch, open_batches
@@ -30,7 +31,7 @@ from standoff.training.run.optimization import (
     set_trainable,
 )
 from standoff.training.run.params import TrainParams
-from standoff.training.run.validation import spread, validate
+from standoff.training.run.validation import validate
 
 _STEPS_OF_ONE_SCALE = 10
 _SEEDS_BETWEEN = 1_000_003
@@ -77,25 +78,15 @@ class Trainer:
 
     Args:
         network: Starting point; its cfg has the size of the input.
-        data: To train on and validate with.
+        data: To train on and validate with; neither split is empty.
         params: Settings.
         checkpoints: Folder of checkpoints.
         backbone_layers: Layers that count as backbone.
-
-    Raises:
-        DataError: A split is empty.
     """
 
     def __init__(
         self, network: DarknetNetwork, data: LabelledData, params: TrainParams, checkpoints: Path, backbone_layers: int
     ) -> None:
-        for split in ("train", "val"):
-            if not data.splits[split]:
-                raise DataError(
-                    expected=f"pictures to {'train on' if split == 'train' else 'validate with'}",
-                    found=f"none in the split '{split}'",
-                    fix="give data with a split, or held_out in the mixture file",
-                )
         self._crew = Crew.join()
         self._stride = largest_stride(network.cfg)
         self._data, self._params, self._checkpoints = data, params, checkpoints
@@ -133,7 +124,7 @@ class Trainer:
         params, first = self._params, self.progress.step
         batches = open_batches(
             self._data.splits["train"],
-            params=params.augment,
+            params=params.augment.for_classes(self._data.classes),
             batch=params.batch,
             sizes_px=lambda number: self._size_px(number // params.accumulate),
             seed=params.seed + _SEEDS_BETWEEN * self._crew.rank,
@@ -172,10 +163,8 @@ class Trainer:
             torch.manual_seed(seed.generate_state(1)[0].item())
             for problem in batch.problems:
                 watcher.on_bad_picture(problem)
-            with saying_what_fits(params.batch, self._try):
-                terms = self._loss(model, batch)
-                torch.autograd.backward(terms.total / params.accumulate)
-            sums += [float(getattr(terms, name).detach()) / params.accumulate for name in _TERMS]
+            with saying_what_fits(params.batch, params.accumulate, self._try):
+                sums += self._add_gradients(model, batch)
         if not np.isfinite(sums).all():
             raise DataError(
                 expected="a finite loss",
@@ -186,6 +175,12 @@ class Trainer:
         self._optimizer.step()
         self._average.update(self._network)
         return [float(value) for value in sums]
+
+    def _add_gradients(self, model: nn.Module, batch: Batch) -> list[float]:
+        """Go forth and back with a batch; by itself, so that a failure lets go of the activations with the frame."""
+        terms, share = self._loss(model, batch), self._params.accumulate
+        torch.autograd.backward(terms.total / share)
+        return [float(getattr(terms, name).detach()) / share for name in _TERMS]
 
     def _try(self, pictures: int) -> None:
         """Go forth and back with empty pictures of the largest size, to see whether the memory suffices."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import sys
+import traceback
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 
@@ -45,11 +46,12 @@ def is_out_of_memory(error: BaseException) -> bool:
 
 
 @contextmanager
-def saying_what_fits(batch: int, attempt: Callable[[int], None]) -> Generator[None, None, None]:
+def saying_what_fits(batch: int, accumulate: int, attempt: Callable[[int], None]) -> Generator[None, None, None]:
     """Turn a failed allocation into advice.
 
     Args:
         batch: Pictures at once that may be too many.
+        accumulate: Batches of one step.
         attempt: Goes through a step with so many pictures, or runs out of memory.
 
     Raises:
@@ -62,11 +64,13 @@ def saying_what_fits(batch: int, attempt: Callable[[int], None]) -> Generator[No
         if not is_out_of_memory(error):
             raise
         cause = error
+    # What the failed step had computed is still in its frames, and would leave less room for a smaller one.
+    traceback.clear_frames(cause.__traceback__)
     smaller = batch // 2
     while smaller and not _fits(attempt, smaller):
         smaller //= 2
     fix = (
-        f"set batch to {smaller}, which fits, and accumulate to {-(-batch // smaller)} for the same step"
+        f"set batch to {smaller}, which fits, and accumulate to {-(-batch * accumulate // smaller)} for the same step"
         if smaller
         else "take a smaller size_px or network: not even one picture fits"
     )

@@ -8,10 +8,11 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
-from standoff.core.errors import ConfigError, ModelError
+from standoff.core.errors import ConfigError, DataError, ModelError
 from standoff.evaluation.detection import DetectionScore
 from standoff.labels import LabelledData, Problem, read_data
 from standoff.labels.near_duplicates import near_duplicates
+from standoff.labels.splits import require_splits, spread
 from standoff.labels.summary import summarise
 from standoff.stages.detect.model_card import file_sha256
 from standoff.stages.sinks.json_text import plain
@@ -44,9 +45,10 @@ class RunPlan:
     params: TrainParams
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what repeats the run: plain values, as `run.yaml` holds them."""
-        weights = None if self.weights is None else str(self.weights)
-        return {"data": str(self.data), "arch": self.arch, "weights": weights, "train": plain(asdict(self.params))}
+        """Return what repeats the run from any folder: plain values, as `run.yaml` holds them."""
+        weights = None if self.weights is None else str(self.weights.resolve())
+        arch = str(Path(self.arch).resolve()) if self.arch.endswith(".cfg") else self.arch
+        return {"data": str(self.data.resolve()), "arch": arch, "weights": weights, "train": plain(asdict(self.params))}
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,9 +86,13 @@ def train_detector(plan: RunPlan, out: Path, listener: Listener, *, resumes: boo
     if leads and not resumes:
         refuse_used(out)
     data = read_data(plan.data)
-    _report_problems(data, listener)
+    _report_problems(data, listener, leads=leads)
+    _require_usable(data, plan.params)
     folder = RunFolder(out, data.classes)
-    network, backbone_layers = _resumed(folder) if resumes else _started(plan, data, folder, listener, leads=leads)
+    if resumes:
+        network, backbone_layers = _resumed(folder, plan.params)
+    else:
+        network, backbone_layers = _started(plan, data, folder, listener, leads=leads)
     trainer = Trainer(network, data, plan.params, folder.checkpoints, plan.params.backbone_layers or backbone_layers)
     if resumes:
         for name in trainer.resume():
@@ -114,6 +120,25 @@ def train_detector(plan: RunPlan, out: Path, listener: Listener, *, resumes: boo
     return progress
 
 
+def _require_usable(data: LabelledData, params: TrainParams) -> None:
+    require_splits(data, ("train", "val"))
+    shown = spread(data.splits["val"], params.validate_pictures)
+    if all(picture.ignored.all() for picture in shown):
+        raise DataError(
+            expected="boxes to validate with",
+            found=f"none in the {len(shown)} pictures of the validation split that are used",
+            fix="label them, hold out other scenes, or raise validate_pictures",
+        )
+    sources = sorted({picture.source for pictures in data.splits.values() for picture in pictures})
+    unknown = sorted(set(params.augment.any_rotation_sources) - set(sources))
+    if unknown:
+        raise ConfigError(
+            expected=f"names of data sets ({', '.join(sources)}) in any_rotation_sources",
+            found=", ".join(unknown),
+            fix="correct the setting",
+        )
+
+
 def _write_results(
     plan: RunPlan, data: LabelledData, folder: RunFolder, progress: Progress, listener: Listener
 ) -> None:
@@ -135,10 +160,6 @@ def _started(
     cfg = parse_cfg(cfg_text, "network.cfg")
     check_input(cfg)
     network, transferred = fill_network(cfg, data.classes, plan.weights, plan.params.seed)
-    layers = len(transferred.copied), len(transferred.resized), len(transferred.fresh)
-    listener.on_message(
-        f"{plan.arch}: {layers[0]} convolutions from {transferred.source}, {layers[1]} fitted, {layers[2]} fresh"
-    )
     facts = {
         "data": asdict(summarise(data)),
         "weights_sha256": None if plan.weights is None else file_sha256(plan.weights),
@@ -146,25 +167,36 @@ def _started(
         "backbone_layers": backbone_of(network, transferred),
     }
     if leads:
+        layers = len(transferred.copied), len(transferred.resized), len(transferred.fresh)
+        listener.on_message(
+            f"{plan.arch}: {layers[0]} convolutions from {transferred.source}, {layers[1]} fitted, {layers[2]} fresh"
+        )
         folder.write_start(cfg_text, network, plan.to_dict(), facts)
     return network, backbone_of(network, transferred)
 
 
-def _resumed(folder: RunFolder) -> tuple[DarknetNetwork, int]:
+def _resumed(folder: RunFolder, params: TrainParams) -> tuple[DarknetNetwork, int]:
     cfg = read_cfg(folder.cfg)
     facts = folder.read_start()
-    if cfg.heads[0].classes != len(folder.classes):
+    classes = folder.read_classes()
+    if classes != folder.classes:
         raise ConfigError(
-            expected=f"the {cfg.heads[0].classes} classes that {folder.path} was started with",
-            found=f"{len(folder.classes)} in the data",
+            expected=f"the classes that {folder.path} was started with, {', '.join(classes)}",
+            found=f"{', '.join(folder.classes)} in the data",
             fix="give the same data, or start a new run",
+        )
+    if (cfg.width_px, cfg.height_px) != params.size_px:
+        raise ConfigError(
+            expected=f"size_px {cfg.width_px}x{cfg.height_px}, with which {folder.path} was started",
+            found="{}x{}".format(*params.size_px),
+            fix="leave it as it was, or start a new run",
         )
     return DarknetNetwork(cfg), int(facts["backbone_layers"])
 
 
-def _report_problems(data: LabelledData, listener: Listener) -> None:
+def _report_problems(data: LabelledData, listener: Listener, *, leads: bool) -> None:
     kinds: dict[str, list[Problem]] = {}
-    for problem in data.problems:
+    for problem in data.problems if leads else ():
         kinds.setdefault(problem.kind, []).append(problem)
     for kind, problems in kinds.items():
         example = problems[0]

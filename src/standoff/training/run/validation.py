@@ -87,10 +87,3 @@ def validate(
             expected="validation pictures that can be decoded", found=f"none of {len(pictures)}", fix="check the files"
         )
     return score_detections(readable, found, classes)
-
-
-def spread(pictures: Sequence[LabelledPicture], count: int) -> tuple[LabelledPicture, ...]:
-    """Return at most `count` pictures, evenly over the sequence."""
-    if len(pictures) <= count:
-        return tuple(pictures)
-    return tuple(pictures[int(index)] for index in np.linspace(0, len(pictures) - 1, count))

@@ -13,13 +13,14 @@ from standoff.labels import LabelledData
 from standoff.training.architectures import ARCHITECTURES
 from standoff.training.architectures.composer import Anchors
 from standoff.training.architectures.refitted import refitted_cfg
-from standoff.training.darknet.cfg import DarknetCfg, parse_cfg, read_text
+from standoff.training.darknet.cfg import DarknetCfg, parse_cfg, read_cfg, read_text
+from standoff.training.darknet.export import read_names
 from standoff.training.darknet.network import DarknetNetwork
 from standoff.training.darknet.shapes import layer_strides
 from standoff.training.pictures.batches import open_batches
 from standoff.training.run.params import TrainParams
 from standoff.training.start.anchors import cluster_anchors, spread_over_heads
-from standoff.training.start.initial_weights import initialize_layers
+from standoff.training.start.initial_weights import head_convolutions, initialize_layers
 from standoff.training.start.transfer import Transferred, transfer_weights
 
 _ANCHORS_A_HEAD = 3
@@ -28,17 +29,18 @@ _ANCHOR_SAMPLES = 256
 
 
 def backbone_of(network: DarknetNetwork, transferred: Transferred) -> int:
-    """Return how many layers from the first the weights filled without a gap; 0 if they filled none."""
-    fresh = min((*transferred.fresh, *transferred.resized), default=len(network.blocks))
-    return fresh if transferred.copied else 0
+    """Return how many layers before the first head the weights filled without a gap; 0 if they filled none."""
+    first_other = min((*transferred.fresh, *transferred.resized, *head_convolutions(network)))
+    return first_other if transferred.copied else 0
 
 
 def boxes_in_training(data: LabelledData, params: TrainParams) -> FloatArray:
     """Return (N, 2) width and height of boxes as training shows them: of augmented pictures, in input pixels."""
     count = -(-_ANCHOR_SAMPLES // params.batch)
     batches = open_batches(
-        data.splits["train"], params=params.augment, batch=params.batch, sizes_px=lambda _: params.size_px,
-        seed=params.seed + 1, first_step=0, last_step=count - 1, workers=params.workers,
+        data.splits["train"], params=params.augment.for_classes(data.classes), batch=params.batch,
+        sizes_px=lambda _: params.size_px, seed=params.seed + 1, first_step=0, last_step=count - 1,
+        workers=params.workers,
     )  # fmt: skip
     with batches as stream:
         sizes = [(batch.boxes[:, 2:] - batch.boxes[:, :2])[~batch.ignored].numpy() for batch in stream]
@@ -96,7 +98,8 @@ def fill_network(
         cfg: The network.
         classes: Names of its classes.
         weights: Darknet weights, whole or cut, of this or another number of classes; or EfficientNet-lite0's torch
-            file; or None: from scratch.
+            file; or None: from scratch. `network.cfg` and `classes.names` beside them, as in the folder of a run,
+            say what they are.
         seed: For what the weights leave open.
 
     Raises:
@@ -108,4 +111,10 @@ def fill_network(
     if weights is None:
         initialize_layers(network, layers, generator)
         return network, Transferred("nothing", (), (), layers)
-    return network, transfer_weights(network, weights, classes=classes, generator=generator)
+    source_cfg, source_names = (weights.resolve().with_name(name) for name in ("network.cfg", "classes.names"))
+    if not (source_cfg.is_file() and source_names.is_file()):
+        return network, transfer_weights(network, weights, classes=classes, generator=generator)
+    source_classes = read_names(source_names, read_cfg(source_cfg))
+    return network, transfer_weights(
+        network, weights, source_cfg, classes=classes, source_classes=source_classes, generator=generator
+    )
