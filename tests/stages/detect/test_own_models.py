@@ -57,7 +57,9 @@ def _as_before_other_families(rows: Array, source_px: tuple[int, int], size_px: 
     wanted = (score >= 0.1) & (xyxy[:, 2:] > xyxy[:, :2]).all(axis=1)
     xyxy, score, class_id = xyxy[wanted], score[wanted], class_id[wanted]
     xywh = np.concatenate([xyxy[:, :2], xyxy[:, 2:] - xyxy[:, :2]], axis=1)
-    kept = np.asarray(cv2.dnn.NMSBoxesBatched(xywh.tolist(), score.tolist(), class_id.tolist(), -1.0, 0.45))
+    kept = np.asarray(
+        cv2.dnn.NMSBoxesBatched(xywh.tolist(), score.tolist(), class_id.tolist(), -1.0, DetectParams().nms_iou)
+    )
     kept = kept[np.argsort(-score[kept], kind="stable")][:300]
     return xyxy[kept], score[kept], class_id[kept]
 

@@ -12,6 +12,7 @@ from standoff.core.errors import DataError
 from standoff.core.types import Detections
 from standoff.evaluation.detection import DetectionScore, score_detections
 from standoff.labels import LabelledPicture, load_picture
+from standoff.stages.detect import DetectParams
 from standoff.stages.detect.letterbox import Letterbox, resize
 from standoff.stages.detect.outputs import read_rows as read_candidates
 from standoff.stages.detect.suppression import suppress
@@ -19,8 +20,7 @@ from standoff.training.darknet.network import DarknetNetwork, DecodedNetwork
 
 _LEAST_SCORE = 0.01
 _MOST_ROWS = 1000
-_MOST_DETECTIONS = 300
-_NMS_IOU = 0.45
+_PARAMS = DetectParams()
 
 
 def detect_pictures(
@@ -66,7 +66,7 @@ def read_rows(rows: npt.NDArray[np.float32], letterbox: Letterbox) -> Detections
     class_id = candidates.probability.argmax(axis=1)
     score = candidates.probability.max(axis=1).astype(np.float64)
     wanted = (score >= _LEAST_SCORE) & (xyxy_px[:, 2:] > xyxy_px[:, :2]).all(axis=1)
-    return suppress(Detections(xyxy_px, score, class_id)[wanted], _NMS_IOU, _MOST_DETECTIONS)
+    return suppress(Detections(xyxy_px, score, class_id)[wanted], _PARAMS.nms_iou, _PARAMS.max_detections)
 
 
 def validate(
