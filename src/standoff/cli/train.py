@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -97,6 +96,7 @@ def _refuse_changes(given: dict[str, object]) -> None:
 def _read_plan(path: Path) -> dict[str, Any]:
     """Read a plan; paths in it are relative to it, `$VARIABLES` and `~` are expanded."""
     from standoff.config import read_settings_file
+    from standoff.labels.documents import resolve_path
 
     plan = read_settings_file(path)
     unknown = sorted(plan.keys() - set(_PLAN_KEYS))
@@ -106,14 +106,10 @@ def _read_plan(path: Path) -> dict[str, Any]:
         )
     for name in ("data", "weights"):
         if plan.get(name) is not None:
-            plan[name] = _resolve(plan[name], path.parent)
+            plan[name] = resolve_path(str(plan[name]), path.parent)
     if str(plan.get("arch", "")).endswith(".cfg"):
-        plan["arch"] = str(_resolve(plan["arch"], path.parent))
+        plan["arch"] = str(resolve_path(plan["arch"], path.parent))
     return plan
-
-
-def _resolve(text: object, folder: Path) -> Path:
-    return folder / Path(os.path.expandvars(str(text))).expanduser()
 
 
 def _override(given: dict[str, Any], named: dict[str, Any], settings: list[str]) -> None:
