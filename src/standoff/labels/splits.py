@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 
 from standoff.core.errors import DataError
+from standoff.core.types import IntArray
 from standoff.labels.mixture import Source
 from standoff.labels.source import SourcePicture
 from standoff.labels.types import LabelledData, LabelledPicture, Split
@@ -158,11 +159,18 @@ def require_splits(data: LabelledData, needed: Sequence[Split]) -> None:
     raise DataError(expected=f"pictures in the splits {' and '.join(needed)}", found=found, fix=fix)
 
 
-def spread(pictures: Sequence[LabelledPicture], count: int) -> tuple[LabelledPicture, ...]:
-    """Return at most `count` pictures, evenly over the sequence."""
-    if len(pictures) <= count:
-        return tuple(pictures)
-    return tuple(pictures[int(index)] for index in np.linspace(0, len(pictures) - 1, count))
+def spread(pictures: Sequence[LabelledPicture], most: int) -> tuple[LabelledPicture, ...]:
+    """Return at most `most` pictures, evenly over the sequence."""
+    return tuple(pictures[row] for row in spread_rows(len(pictures), most))
+
+
+def spread_rows(count: int, most: int | None) -> IntArray:
+    """Return positions of all of `count` things, or of `most` evenly over them, the first and the last among them.
+
+    >>> spread_rows(9, 3).tolist(), spread_rows(2, 3).tolist(), spread_rows(2, None).tolist()
+    ([0, 4, 8], [0, 1], [0, 1])
+    """
+    return np.linspace(0, count - 1, min(count, most or count)).round().astype(np.int64)
 
 
 def _scene(picture: LabelledPicture) -> str:

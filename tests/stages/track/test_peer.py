@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 import tolerances
 
+from standoff.core.boxes import overlaps
 from standoff.core.homography import FloatArray
 from standoff.core.types import Detections, IntArray
 from standoff.stages.track import Tracker, TrackParams
-from standoff.stages.track.association import overlaps
 
 trackers = pytest.importorskip("trackers", reason="the peer is not installed: pip install --no-deps trackers")
 supervision = pytest.importorskip("supervision", reason="the peer's boxes are not installed: pip install supervision")

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from standoff.core.boxes import areas_px2, overlaps, shared_px2
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import Detections, IntArray
 from standoff.labels.types import LabelledPicture
-from standoff.stages.track.association import overlaps
 
 NOTHING = -1
 IGNORED_SHARE = 0.5
@@ -114,9 +114,6 @@ def _choose(similarity: FloatArray, least: float) -> IntArray:
 
 def _shares_inside(boxes_px: FloatArray, regions_px: FloatArray) -> FloatArray:
     """Return (N, M) the part of each box's area that lies in each region."""
-    low = np.maximum(boxes_px[:, None, :2], regions_px[None, :, :2])
-    high = np.minimum(boxes_px[:, None, 2:], regions_px[None, :, 2:])
-    shared = np.maximum(high - low, 0.0).prod(axis=2)
-    area = (boxes_px[:, 2:] - boxes_px[:, :2]).prod(axis=1)[:, None]
-    shares: FloatArray = shared / np.where(area > 0.0, area, 1.0)
+    area = areas_px2(boxes_px)[:, None]
+    shares: FloatArray = shared_px2(boxes_px, regions_px) / np.where(area > 0.0, area, 1.0)
     return shares

@@ -18,6 +18,7 @@ from standoff.evaluation.positions_input import read_truth
 from standoff.labels import load_picture, read_data
 from standoff.labels.marking import would_be_marked
 from standoff.labels.site_classes import to_site_classes
+from standoff.labels.splits import spread_rows
 from standoff.labels.types import LabelledPicture, Split
 from standoff.stages.frames import frame_from_array, open_source
 
@@ -63,7 +64,7 @@ def labelled_pictures(path: Path, split: Split, limit: int | None = None) -> Mat
             found=counts or "no picture at all",
             fix="choose another split with --split" if counts else "check the path",
         )
-    chosen = _spread(len(pictures), limit)
+    chosen = spread_rows(len(pictures), limit)
     truth = tuple(pictures[row] for row in chosen)
 
     def frames() -> Iterator[Frame]:
@@ -89,7 +90,7 @@ def simulated_clip(folder: Path, limit: int | None = None) -> Material:
     seen = rows["visible_px"] > 0
     boxes_px = np.column_stack([rows[name] for name in ("x1_px", "y1_px", "x2_px", "y2_px")]).astype(np.float64)
     ignored = ~would_be_marked(boxes_px, rows["visible_px"], rows["visible_share"])
-    chosen = _spread(clip.frame_count, limit)
+    chosen = spread_rows(clip.frame_count, limit)
     size_px = _size_px(clip.video)
     truth = []
     for frame in chosen:
@@ -125,7 +126,7 @@ def video_with_people(
         )
     boxes_px = np.column_stack([rows["x"], rows["y"], rows["x"] + rows["w"], rows["y"] + rows["h"]])
     people = np.full(len(boxes_px), CLASS_BY_NAME["worker"].id)
-    chosen = _spread(last - first + 1, limit) + first - 1
+    chosen = spread_rows(last - first + 1, limit) + first - 1
     size_px = _size_px(video)
     truth = []
     for frame in chosen:
@@ -155,11 +156,6 @@ def open_material(
     if (path / "truth.parquet").is_file():
         return simulated_clip(path, limit)
     return labelled_pictures(path, split, limit)
-
-
-def _spread(count: int, limit: int | None) -> IntArray:
-    """Return positions of all, or of `limit` evenly spread ones."""
-    return np.unique(np.linspace(0, count - 1, min(count, limit or count)).round().astype(np.int64))
 
 
 def _size_px(video: Path) -> tuple[int, int]:

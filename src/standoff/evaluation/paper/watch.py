@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from standoff.core.boxes import overlaps
 from standoff.core.classes import CLASSES
 from standoff.core.errors import DataError
 from standoff.core.homography import FloatArray
@@ -21,7 +22,7 @@ from standoff.evaluation.paper.turning import Turning
 from standoff.evaluation.rectification import FAILURE_PX
 from standoff.stages.frames import Source, open_source
 from standoff.stages.ground import ReferenceShape
-from standoff.stages.track.association import assign, overlaps
+from standoff.stages.track.association import assign
 
 NOT_VISIBLE = "not visible"
 NOT_DETECTED = "not detected"

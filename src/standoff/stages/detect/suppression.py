@@ -7,7 +7,8 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
-from standoff.core.homography import BoolArray, FloatArray
+from standoff.core.boxes import areas_px2, overlaps, shared_px2
+from standoff.core.homography import BoolArray
 from standoff.core.types import Detections
 
 
@@ -37,18 +38,6 @@ def suppress(detections: Detections, iou: float, limit: int) -> Detections:
     return detections[surest_first[:limit]]
 
 
-def _areas(xyxy: FloatArray) -> FloatArray:
-    areas: FloatArray = (xyxy[:, 2] - xyxy[:, 0]) * (xyxy[:, 3] - xyxy[:, 1])
-    return areas
-
-
-def _intersections(one: FloatArray, other: FloatArray) -> FloatArray:
-    """Areas shared by each of (N, 4) with each of (M, 4): (N, M)."""
-    sides = np.minimum(one[:, None, 2:], other[:, 2:]) - np.maximum(one[:, None, :2], other[:, :2])
-    shared: FloatArray = np.maximum(sides, 0.0).prod(axis=2)
-    return shared
-
-
 def prefer_finer(
     detections: Detections, is_coarse: BoolArray, is_fine: BoolArray, least_iou: float
 ) -> tuple[Detections, BoolArray]:
@@ -71,8 +60,7 @@ def prefer_finer(
     if not len(coarse) or not len(fine):
         return detections, kept
     boxes = detections.xyxy_px
-    shared = _intersections(boxes[coarse], boxes[fine])
-    iou = shared / (_areas(boxes[coarse])[:, None] + _areas(boxes[fine]) - shared)
+    iou = overlaps(boxes[coarse], boxes[fine])
     iou[detections.class_id[coarse][:, None] != detections.class_id[fine]] = 0.0
     nearest = iou.argmax(axis=1)
     gives_way = iou[np.arange(len(coarse)), nearest] >= least_iou
@@ -96,13 +84,13 @@ def join_cut(detections: Detections, cut: BoolArray, least_overlap: float) -> De
     Returns:
         The remaining boxes, largest first.
     """
-    largest_first = np.argsort(-_areas(detections.xyxy_px), kind="stable")
+    largest_first = np.argsort(-areas_px2(detections.xyxy_px), kind="stable")
     detections, cut = detections[largest_first], cut[largest_first]
     boxes, score = detections.xyxy_px.copy(), detections.score.copy()
     kept = np.ones(len(detections), dtype=np.bool_)
     pieces = np.flatnonzero(cut)
-    smaller = np.minimum(_areas(boxes)[:, None], _areas(boxes[pieces]))
-    is_piece_of = _intersections(boxes, boxes[pieces]) / smaller >= least_overlap
+    smaller = np.minimum(areas_px2(boxes)[:, None], areas_px2(boxes[pieces]))
+    is_piece_of = shared_px2(boxes, boxes[pieces]) / smaller >= least_overlap
     is_piece_of &= detections.class_id[:, None] == detections.class_id[pieces]
     is_piece_of &= pieces > np.arange(len(boxes))[:, None]
     for index in np.flatnonzero(is_piece_of.any(axis=1)):

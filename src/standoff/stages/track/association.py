@@ -1,4 +1,4 @@
-"""Which detection belongs to which track: overlap and optimal assignment."""
+"""Which detection belongs to which track: widened boxes and optimal assignment."""
 
 from __future__ import annotations
 
@@ -27,29 +27,6 @@ def widen(xyxy_px: FloatArray, margin: float) -> FloatArray:
     """
     grow = margin * (xyxy_px[:, 2:] - xyxy_px[:, :2])
     return np.concatenate([xyxy_px[:, :2] - grow, xyxy_px[:, 2:] + grow], axis=1)
-
-
-def overlaps(first_px: FloatArray, second_px: FloatArray) -> FloatArray:
-    """Return intersection over union of every pair of boxes.
-
-    Args:
-        first_px: (N, 4) left, top, right, bottom.
-        second_px: (M, 4).
-
-    Returns:
-        (N, M), 0 to 1; 0 where both boxes are empty.
-
-    >>> overlaps(np.array([[0.0, 0.0, 2.0, 1.0]]), np.array([[1.0, 0.0, 3.0, 1.0]])).round(3)
-    array([[0.333]])
-    """
-    left, top, right, bottom = first_px.T[:, :, None]
-    other_left, other_top, other_right, other_bottom = second_px.T[:, None, :]
-    width = np.minimum(right, other_right) - np.maximum(left, other_left)
-    height = np.minimum(bottom, other_bottom) - np.maximum(top, other_top)
-    shared = np.maximum(width, 0.0) * np.maximum(height, 0.0)
-    union = (right - left) * (bottom - top) + (other_right - other_left) * (other_bottom - other_top) - shared
-    ratio: FloatArray = shared / np.where(union > 0.0, union, 1.0)
-    return ratio
 
 
 def assign(similarity: FloatArray, at_least: float) -> tuple[IntArray, IntArray]:

@@ -6,11 +6,12 @@ import math
 
 import numpy as np
 
+from standoff.core.boxes import overlaps
 from standoff.core.classes import CLASSES, Role
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import Detections, IntArray, Tracks
 from standoff.stages.track import motion
-from standoff.stages.track.association import assign, overlaps, widen
+from standoff.stages.track.association import assign, widen
 from standoff.stages.track.params import TrackParams
 
 _ROW = np.dtype(

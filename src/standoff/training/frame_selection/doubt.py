@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from standoff.core.boxes import overlaps
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import Detections
 
@@ -47,17 +48,6 @@ def flickering(now: Detections, next_one: Detections, threshold: float) -> BoolA
     Returns:
         (N,).
     """
-    iou = _iou(now.xyxy_px, next_one.xyxy_px)
-    same = (iou >= _SAME_IOU) & (now.class_id[:, None] == next_one.class_id[None])
+    same = (overlaps(now.xyxy_px, next_one.xyxy_px) >= _SAME_IOU) & (now.class_id[:, None] == next_one.class_id[None])
     lost: BoolArray = (now.score >= threshold) & ~same.any(axis=1)
     return lost
-
-
-def _iou(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Return (A, B) intersection over union."""
-    extent = np.minimum(a[:, None, 2:], b[None, :, 2:]) - np.maximum(a[:, None, :2], b[None, :, :2])
-    shared = np.maximum(extent, 0.0).prod(axis=2)
-    areas_a, areas_b = ((boxes[:, 2:] - boxes[:, :2]).prod(axis=1) for boxes in (a, b))
-    union = areas_a[:, None] + areas_b[None] - shared
-    iou: FloatArray = shared / np.maximum(union, 1e-9)
-    return iou

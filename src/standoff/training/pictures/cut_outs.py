@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from standoff.core.boxes import areas_px2, shared_px2
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import ImageArray, IntArray
 from standoff.training.pictures.augment_params import AugmentParams
@@ -38,9 +39,8 @@ def hide_parts(rng: np.random.Generator, image: ImageArray, xyxy_px: FloatArray,
             continue
         patch = image[source[1] : source[1] + end[1] - start[1], source[0] : source[0] + end[0] - start[0]].copy()
         image[start[1] : end[1], start[0] : end[0]] = patch
-        hidden_px2 += _shared_px2(xyxy_px, start, end)
-    whole_px2 = (xyxy_px[:, 2:] - xyxy_px[:, :2]).prod(axis=1)
-    return np.asarray(hidden_px2 > params.hidden_share * whole_px2)
+        hidden_px2 += shared_px2(xyxy_px, np.concatenate([start, end])[None])[:, 0]
+    return np.asarray(hidden_px2 > params.hidden_share * areas_px2(xyxy_px))
 
 
 def _on_object(rng: np.random.Generator, xyxy_px: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -60,13 +60,6 @@ def _empty_place(rng: np.random.Generator, xyxy_px: FloatArray, sides: IntArray,
     """Return the corner of a rectangle that shares nothing with any box; None if several tries find none."""
     for _ in range(_TRIES):
         start = rng.integers(0, size - sides + 1)
-        if not _shared_px2(xyxy_px, start, start + sides).any():
+        if not shared_px2(xyxy_px, np.concatenate([start, start + sides])[None]).any():
             return start
     return None
-
-
-def _shared_px2(xyxy_px: FloatArray, start: IntArray, end: IntArray) -> FloatArray:
-    """Return the area that each box shares with a rectangle."""
-    sides = np.minimum(xyxy_px[:, 2:], end) - np.maximum(xyxy_px[:, :2], start)
-    shared: FloatArray = np.clip(sides, 0.0, None).prod(axis=1)
-    return shared

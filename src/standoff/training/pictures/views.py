@@ -9,6 +9,7 @@ from typing import Final
 import cv2
 import numpy as np
 
+from standoff.core.boxes import areas_px2
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import ImageArray
 from standoff.labels.types import LabelledPicture
@@ -90,7 +91,7 @@ def cut_boxes(
     limit = np.array([*size_px, *size_px], dtype=np.float64)
     cut_px: FloatArray = np.clip(carried_px, 0.0, limit)
     sides_px = cut_px[:, 2:] - cut_px[:, :2]
-    left_px2, whole_px2 = sides_px.prod(axis=1), (carried_px[:, 2:] - carried_px[:, :2]).prod(axis=1)
+    left_px2, whole_px2 = areas_px2(cut_px), areas_px2(carried_px)
     present = (left_px2 > 0) & (ignored | (left_px2 >= params.drop_share * whole_px2))
     is_small = (np.sort(sides_px, axis=1) < params.least_sides_px).any(axis=1)
     unsure = is_small | (left_px2 < params.keep_share * whole_px2)
