@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from standoff.core.types import Detections, ImageArray
-from standoff.evaluation.detection.figures import GRID, INK, QUIET, SERIES_COLOURS
+from standoff.evaluation.detection.style import GRID, INK, QUIET, SERIES_COLOURS
 from standoff.labels import LabelledPicture, load_picture
 from standoff.stages.detect.letterbox import resize
 
