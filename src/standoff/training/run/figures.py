@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from standoff.core.types import Detections, ImageArray
-from standoff.evaluation.detection.style import GRID, INK, QUIET, SERIES_COLOURS
+from standoff.evaluation.detection.style import GRID, INK, SERIES_COLOURS
 from standoff.labels import LabelledPicture, load_picture
 from standoff.stages.detect.letterbox import resize
 
@@ -42,7 +42,7 @@ def draw_curves(rows: Sequence[dict[str, Any]], classes: Sequence[str], path: Pa
         if np.isfinite(values).any():
             _line(accuracy, steps, values, name.replace("_", " "), colour, width=1.0)
     _line(accuracy, steps, [100.0 * row["map"] for row in rows], "mAP", INK, width=2.4)
-    _line(accuracy, steps, [100.0 * row["average_iou"] for row in rows], "average IoU", QUIET, width=1.6)
+    _line(accuracy, steps, [100.0 * row["average_iou"] for row in rows], "average IoU", INK, width=1.2, style="--")
     accuracy.set(ylim=(0, 100), title="11-point AP and average IoU on validation pictures, %", xlabel="step")
     accuracy.legend(loc="lower right", fontsize=8, frameon=False, ncols=2)
     losses.legend(loc="upper right", fontsize=8, frameon=False)
@@ -52,8 +52,11 @@ def draw_curves(rows: Sequence[dict[str, Any]], classes: Sequence[str], path: Pa
     figure.savefig(path, format="png")
 
 
-def _line(axes: Axes, steps: Sequence[int], values: Sequence[float], label: str, colour: str, width: float) -> None:
-    axes.plot(steps, values, color=colour, linewidth=width, label=label, marker="o" if len(steps) < 2 else None)
+def _line(
+    axes: Axes, steps: Sequence[int], values: Sequence[float], label: str, colour: str, width: float, style: str = "-"
+) -> None:
+    marker = "o" if len(steps) < 2 else None
+    axes.plot(steps, values, style, color=colour, linewidth=width, label=label, marker=marker)
 
 
 def draw_predictions(
