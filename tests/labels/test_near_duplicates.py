@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -52,8 +53,17 @@ def test_copies_across_splits_are_found_with_their_originals(tmp_path: Path, see
     found = {(pair.train.stem, pair.held_out.stem, pair.split) for pair in pairs}
     assert found == {("train3", "val1", "val"), ("train6", "val2", "val"), ("train5", "test0", "test")}
     assert [pair.bits for pair in pairs] == sorted(pair.bits for pair in pairs)
-    assert list(near_duplicates(data, limit=1)) == list(pairs[:1])
     assert list(near_duplicates(data, max_bits=pairs[0].bits)) == [pair for pair in pairs if pair.bits == pairs[0].bits]
+
+
+def test_pictures_of_a_few_pixels_are_passed_over(tmp_path: Path) -> None:
+    data = _data(tmp_path, train=[_scene(1)], val=[_scene(1)])
+    sides_px: dict[Split, int] = {"train": 1, "val": 3}
+    for split, side_px in sides_px.items():
+        path = tmp_path / f"{split}-speck.png"
+        assert cv2.imwrite(str(path), np.zeros((side_px, side_px, 3), np.uint8))
+        data.splits[split] += (replace(data.splits[split][0], path=path, size_px=(side_px, side_px)),)
+    assert [pair.train.stem for pair in near_duplicates(data)] == ["train0"]
 
 
 def test_blank_ground_does_not_flood_the_list(tmp_path: Path) -> None:

@@ -251,6 +251,7 @@ def test_a_bad_xml_file_costs_its_own_picture_only(tmp_path: Path, xml: str) -> 
         ({"set/annotations/train.json": "{"}, "expected JSON in"),
         ({"set/annotations/train.json": '{"images": [1]}'}, "images"),
         ({"set/a.txt": "0 0.5 0.5 1 1"}, "classes.txt"),
+        ({"set/images/a.png": "", "set/classes.txt": "car\n\nbus\n"}, "an empty line for class id 1"),
     ],
 )
 def test_what_is_no_data_set_is_refused_with_a_reason(tmp_path: Path, files: dict[str, str], said: str) -> None:

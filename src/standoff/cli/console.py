@@ -77,9 +77,9 @@ def progress_bar(*, quiet: bool, unit: str = "frames") -> Progress:
 
 @contextmanager
 def progress(
-    what: str, total: int, *, quiet: bool = False, unit: str = "frames"
+    what: str, total: int | None, *, quiet: bool = False, unit: str = "frames"
 ) -> Generator[Callable[[], None], None, None]:
-    """Show the progress of one task; give what is to be called after each step."""
+    """Show the progress of one task of a known or unknown number of steps; give what is to be called after each."""
     with progress_bar(quiet=quiet, unit=unit) as bar:
         task = bar.add_task(what, total=total, rate=0.0)
         started_s = monotonic()

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from standoff.evaluation.detection.material import Material
     from standoff.evaluation.detection.trial import Candidate
 
-Split = Literal["train", "val", "test"]
+Split = Literal["train", "val", "test", "all"]
 
 
 def detection(
@@ -32,7 +32,10 @@ def detection(
     model: Annotated[
         list[str], typer.Option(help="Detector: site (ours), or ONNX; may be repeated.", show_default=False)
     ],
-    split: Annotated[Split, typer.Option(help="Of labelled pictures.")] = "test",
+    split: Annotated[
+        Split | None,
+        typer.Option(help="Of labelled pictures. [default: test, or all where nothing says what is held out]"),
+    ] = None,
     slices: Annotated[
         list[str] | None, typer.Option(help="Slices, COLUMNSxROWS: one for all models or one for each. [default: 1x1]")
     ] = None,
@@ -56,18 +59,24 @@ def detection(
     markdown: Annotated[bool, typer.Option("--markdown", help="Print the tables in Markdown.")] = False,
 ) -> None:
     """Compare detectors: mAP, average IoU, localisation error, COCO's figures, milliseconds."""
-    from standoff.cli.console import write_json
+    from standoff.cli.console import progress, write_json
     from standoff.cli.detection_tables import print_comparison
     from standoff.evaluation.detection.coco import require_pycocotools
     from standoff.evaluation.detection.figures import write_figures
     from standoff.evaluation.detection.grouping import site_grouping
     from standoff.evaluation.detection.material import open_material
+    from standoff.labels.problems import problem_lines
     from standoff.stages.detect import find_model
 
     require_pycocotools()
     grouping = site_grouping(merge_machines=merge_machines, without=without or ())
     candidates = _candidates([find_model(name) for name in model], slices or ["1x1"])
-    material = open_material(data, split=split, video=video, frames=frame_range(frames), limit=limit)
+    with progress("reading", None, unit="pictures") as on_picture:
+        material = open_material(
+            data, split=split, video=video, frames=frame_range(frames), limit=limit, on_picture=on_picture
+        )
+    for line in problem_lines(material.problems):
+        typer.echo(line, err=True)
     comparison = _compare(candidates, material, grouping, iou, at or [])
     # First what cannot fail: a mistyped path must not cost an hour of inference.
     if str(json_file) != "-":

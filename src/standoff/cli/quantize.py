@@ -28,6 +28,7 @@ def quantize(
 
     from standoff.cli.console import progress
     from standoff.labels import read_data
+    from standoff.labels.problems import problem_lines
     from standoff.labels.site_classes import to_site_classes
     from standoff.training.required import require_packages
 
@@ -37,7 +38,10 @@ def quantize(
     plan = QuantizationPlan(split=split, calibration_pictures=calibration, method=method)
     show = partial(progress, quiet=quiet or as_json, unit="steps")
     try:
-        report = quantize_model(model, to_site_classes(read_data(data)), out, plan, show)
+        labelled = to_site_classes(read_data(data))
+        for line in problem_lines(labelled.problems):
+            typer.echo(line, err=True)
+        report = quantize_model(model, labelled, out, plan, show)
     except QuantizationRefused as refused:
         if refused.report is not None:
             _tell(refused.report, as_json=as_json, quiet=quiet)
@@ -59,7 +63,7 @@ def _tell(report: QuantizationReport, *, as_json: bool, quiet: bool) -> None:
     rows = [("mAP", "", *_points(loss.before, loss.after), "")]
     rows += [
         (
-            f"AP {one.name}" + ("" if one.counted else " (too few to count)"),
+            f"AP {one.name}" + ("" if one.counted else " (few: more is allowed)"),
             f"{one.truths}",
             *_points(one.before, one.after),
             " to ".join(_points(one.recall_before, one.recall_after)[:2]),
@@ -74,6 +78,8 @@ def _tell(report: QuantizationReport, *, as_json: bool, quiet: bool) -> None:
         f"{report.deciding_pictures} pictures compared, {report.calibration_pictures} calibrated.\n"
         "* at the score that suits the float model best, float to int8",
     )
+    for path in report.unreadable:
+        typer.echo(f"{path} cannot be decoded and was left out", err=True)
     for attempt in report.attempts:
         typer.echo(f"{attempt.recipe.summary}: {', '.join(attempt.loss.complaints) or 'accepted'}")
 

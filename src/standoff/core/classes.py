@@ -63,3 +63,18 @@ def class_ids(role: Role) -> tuple[int, ...]:
     (0,)
     """
     return tuple(site_class.id for site_class in CLASSES if site_class.role is role)
+
+
+def names_by_line(text: str) -> tuple[str, ...]:
+    r"""Return the names of a list with one a line; a line's number is the class id, so none may be empty.
+
+    Raises:
+        ValueError: A line between two names is empty; says which.
+
+    >>> names_by_line("worker\nexcavator\n\n")
+    ('worker', 'excavator')
+    """
+    names = tuple(line.strip() for line in text.rstrip().splitlines())
+    if "" in names:
+        raise ValueError(f"an empty line for class id {names.index('')}; write some word for an id that is not used")
+    return names

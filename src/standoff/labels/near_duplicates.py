@@ -54,7 +54,6 @@ def near_duplicates(
     data: LabelledData,
     *,
     max_bits: int = MAX_BITS,
-    limit: int = 1000,
     on_picture: Callable[[], None] | None = None,
 ) -> Sequence[NearDuplicate]:
     """Find pictures of `val` and `test` that look like one of `train`.
@@ -62,7 +61,6 @@ def near_duplicates(
     Args:
         data: Labelled pictures; those that cannot be decoded and plain ones (fog, blank sand) are passed over.
         max_bits: In which two pictures may differ to count as alike.
-        limit: Pairs to return at most.
         on_picture: Called after each picture.
 
     Returns:
@@ -80,7 +78,7 @@ def near_duplicates(
             NearDuplicate(train_paths[nearest[row]], paths[row], split, int(bits[row]))
             for row in np.flatnonzero(bits <= max_bits)
         ]
-    return sorted(found, key=lambda pair: (pair.bits, pair.held_out))[:limit]
+    return sorted(found, key=lambda pair: (pair.bits, pair.held_out))
 
 
 def hash_picture(gray: ImageArray) -> _Words | None:
@@ -112,7 +110,11 @@ def _hash_all(pictures: Sequence[LabelledPicture], on_picture: Callable[[], None
 
 def _read_small(path: Path) -> ImageArray | None:
     """Return a grey picture at a quarter of its size, decoded at that size from JPEG; None: not readable."""
-    return cv2.imread(str(path), cv2.IMREAD_REDUCED_GRAYSCALE_4 | cv2.IMREAD_IGNORE_ORIENTATION)
+    try:
+        return cv2.imread(str(path), cv2.IMREAD_REDUCED_GRAYSCALE_4 | cv2.IMREAD_IGNORE_ORIENTATION)
+    except cv2.error:
+        # A quarter of fewer than four pixels is none.
+        return None
 
 
 def _nearest(words: _Words, among: _Words) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.int64]]:

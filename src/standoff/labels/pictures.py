@@ -19,7 +19,7 @@ from PIL import Image, UnidentifiedImageError
 from standoff.core.errors import DataError
 from standoff.core.types import ImageArray
 from standoff.labels.source import BadPicture
-from standoff.labels.types import LabelledPicture
+from standoff.labels.types import UNREADABLE, LabelledPicture
 
 SUFFIXES: Final = frozenset({".bmp", ".jpeg", ".jpg", ".png", ".tif", ".tiff", ".webp"})
 _WHOLE_ENDINGS: Final = (b"\xff\xd9", b"IEND\xaeB`\x82")
@@ -60,7 +60,7 @@ def read_size_px(path: Path) -> tuple[int, int]:
     except FileNotFoundError as error:
         raise BadPicture(path, "no such file", "picture missing") from error
     except (OSError, ValueError, Image.DecompressionBombError) as error:
-        raise BadPicture(path, f"not a picture ({_reason(error)})", "unreadable picture") from error
+        raise BadPicture(path, f"not a picture ({_reason(error)})", UNREADABLE) from error
 
 
 def load_picture(picture: LabelledPicture, reduction: int = 1) -> ImageArray:

@@ -18,7 +18,7 @@ from standoff.labels.layout import YAML_SUFFIXES, read_negatives, read_set
 from standoff.labels.mixture import DROP, IGNORE, Mixture, Source, read_mixture
 from standoff.labels.regions import read_regions
 from standoff.labels.source import BadPicture, SourcePicture, SourceSet
-from standoff.labels.splits import group_of, split_pictures
+from standoff.labels.splits import group_of, is_divided, split_pictures
 from standoff.labels.types import SPLITS, LabelledData, LabelledPicture, Problem, Split
 
 _OWN_REGIONS: Final = "ignore.yaml"
@@ -62,7 +62,12 @@ def read_data(path: Path) -> LabelledData:
         problems += found
         for split in SPLITS:
             splits[split] += pictures[split]
-    return LabelledData(classes, {split: tuple(pictures) for split, pictures in splits.items()}, problems)
+    return LabelledData(
+        classes=classes,
+        splits={split: tuple(pictures) for split, pictures in splits.items()},
+        problems=problems,
+        is_divided=any(is_divided(source, one.pictures) for source, one in zip(mixture.sources, sets, strict=True)),
+    )
 
 
 def _open_mixture(path: Path) -> Mixture:

@@ -42,4 +42,4 @@ def to_site_classes(data: LabelledData) -> LabelledData:
         )
 
     splits = {split: tuple(map(renamed, pictures)) for split, pictures in data.splits.items()}
-    return LabelledData(tuple(site_class.name for site_class in CLASSES), splits, data.problems)
+    return replace(data, classes=tuple(site_class.name for site_class in CLASSES), splits=splits)

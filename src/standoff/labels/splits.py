@@ -96,6 +96,12 @@ def split_pictures(
     return [split_of[group] for group in groups]
 
 
+def is_divided(source: Source, pictures: Sequence[SourcePicture]) -> bool:
+    """Tell whether the set or the mixture says what is held out."""
+    says = source.split is not None or bool(source.groups) or source.held_out is not None
+    return says or any(picture.split for picture in pictures)
+
+
 def hold_out(groups: Sequence[str], held_out: Mapping[Split, float], seed: int) -> dict[str, Split]:
     """Choose groups to hold out, so that about the wanted share of the pictures is in them.
 

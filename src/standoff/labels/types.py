@@ -12,6 +12,8 @@ from standoff.core.types import IntArray
 
 Split = Literal["train", "val", "test"]
 SPLITS: tuple[Split, ...] = get_args(Split)
+UNREADABLE = "unreadable picture"
+"""`Problem.kind` of a picture of which the header or the pixels cannot be decoded."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,8 +68,10 @@ class LabelledData:
         classes: Names; `class_id` is a position in it.
         splits: The pictures of each split, in a fixed order; a split may be empty.
         problems: What was wrong, in the order found.
+        is_divided: False where nothing in the data says what is held out, so that the splits are standoff's own choice.
     """
 
     classes: tuple[str, ...]
     splits: dict[Split, tuple[LabelledPicture, ...]]
     problems: Sequence[Problem]
+    is_divided: bool = True

@@ -13,6 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from standoff.core.classes import names_by_line
 from standoff.core.errors import DataError
 from standoff.core.homography import FloatArray
 from standoff.labels.documents import read_yaml
@@ -99,8 +100,12 @@ def _by_id(names: Mapping[Any, Any]) -> dict[int, str]:
 def _read_names(folder: Path) -> tuple[str, ...]:
     for name in _NAME_FILES:
         if (folder / name).is_file():
-            lines = (folder / name).read_text(encoding="utf-8-sig", errors="replace").splitlines()
-            labels = tuple(line.strip() for line in lines if line.strip())
+            text = (folder / name).read_text(encoding="utf-8-sig", errors="replace")
+            try:
+                labels = names_by_line(text)
+            except ValueError as error:
+                expected = f"a label a line in {folder / name}"
+                raise DataError(expected=expected, found=str(error), fix="correct the file") from error
             if labels:
                 return labels
     raise DataError(

@@ -130,6 +130,34 @@ def test_machines_can_be_scored_as_one_class_and_a_class_left_out(cells: Path, m
     assert without["score"]["mean_ap11"] == 1.0
 
 
+def test_a_picture_cut_short_is_named_and_left_out_for_all_models(cells: Path, model: Path, tmp_path: Path) -> None:
+    data = tmp_path / "cells"
+    shutil.copytree(cells, data)
+    broken = data / "images" / "test" / "scene2-0.png"
+    broken.write_bytes(broken.read_bytes()[:-30])
+    (data / "labels" / "test" / "scene3-0.txt").write_text("9 0.5 0.5 0.1 0.1\n")
+    result = CliRunner().invoke(
+        app, ["evaluate", "detection", "--data", str(data), "--model", str(model), "--json", str(tmp_path / "r.json")]
+    )
+    assert result.exit_code == 0, result.output
+    assert "1 times unreadable picture" in result.stderr and broken.name in result.stderr
+    assert "class id 9" in result.stderr
+    figures = json.loads((tmp_path / "r.json").read_text())
+    assert (figures["pictures"], len(figures["problems"])) == (SCENES - 2, 2)
+    assert classes_of(figures["models"][0])["worker"]["truths"] == SCENES - 2
+
+
+def test_where_nothing_says_what_is_held_out_everything_is_scored(cells: Path, model: Path, tmp_path: Path) -> None:
+    for kind in ("images", "labels"):
+        shutil.copytree(cells / kind / "test", tmp_path / "plain" / kind)
+    shutil.copy(cells / "classes.txt", tmp_path / "plain")
+    words = ("--data", tmp_path / "plain", "--model", model, "--json", "-")
+    whole = json.loads(evaluate(*words))
+    assert (whole["pictures"], whole["data"]) == (SCENES, "plain, all")
+    assert json.loads(evaluate(*words, "--split", "test"))["pictures"] < SCENES
+    assert json.loads(evaluate("--data", cells, *words[2:]))["data"] == "cells, test"
+
+
 def test_markdown_is_tables_and_figures_are_pictures(cells: Path, model: Path, tmp_path: Path) -> None:
     text = evaluate(
         "--data", cells, "--model", model, "--markdown", "--limit", 4, "--figure", tmp_path / "f",

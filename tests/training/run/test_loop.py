@@ -12,7 +12,7 @@ import pytest
 import torch
 from training.small_runs import CFG, small_params, write_data
 
-from standoff.core.errors import ConfigError, DataError
+from standoff.core.errors import ConfigError, DataError, OutputError
 from standoff.labels import LabelledData, Problem, read_data
 from standoff.training.darknet.cfg import parse_cfg
 from standoff.training.darknet.network import DarknetNetwork
@@ -106,6 +106,14 @@ def test_without_a_whole_checkpoint_nothing_is_resumed(tmp_path: Path) -> None:
         load_checkpoint(tmp_path)
     with pytest.raises(DataError, match=r"found none\. Delete the folder of the run, or choose another --out"):
         load_checkpoint(tmp_path / "none")
+
+
+def test_a_checkpoint_that_cannot_be_written_leaves_the_older_ones(tmp_path: Path) -> None:
+    save_checkpoint(tmp_path, 1, {"step": 1})
+    (tmp_path / "step-0000002.partial").mkdir()
+    with pytest.raises(OutputError, match="Make room or give write permission, and go on with --resume"):
+        save_checkpoint(tmp_path, 2, {"step": 2})
+    assert load_checkpoint(tmp_path) == ({"step": 1}, ())
 
 
 def test_two_checkpoints_are_kept(tmp_path: Path) -> None:

@@ -180,12 +180,39 @@ def test_a_run_goes_on_only_with_its_classes_and_its_size(tmp_path: Path) -> Non
     plan = _plan(tmp_path, steps=4, warmup_steps=1)
     train_detector(plan, tmp_path / "run", _Heard().listener())
     larger = RunPlan(plan.data, plan.arch, None, small_params(steps=4, warmup_steps=1, size_px=(128, 96)))
-    with pytest.raises(ConfigError, match=r"size_px 96x64, .* found 128x96"):
+    with pytest.raises(ConfigError, match=r"size_px \[96, 64\], .* found \[128, 96\]"):
         train_detector(larger, tmp_path / "run", _Heard().listener(), resumes=True)
     names = plan.data / "data.yaml"
     names.write_text(yaml.safe_dump({**yaml.safe_load(names.read_text()), "names": ["vehicle", "worker"]}))
     with pytest.raises(ConfigError, match="worker, vehicle, found vehicle, worker in the data"):
         train_detector(plan, tmp_path / "run", _Heard().listener(), resumes=True)
+
+
+@pytest.mark.parametrize(
+    ("change", "telling"),
+    [
+        ({"optimizer": "sgd"}, "optimizer adamw"),
+        ({"weight_decay": 0.1}, "weight_decay"),
+        ({"backbone_layers": 3}, "backbone_layers 0"),
+        ({"augment": replace(QUIET, mosaic=0.5)}, r"augment\.mosaic"),
+    ],
+)
+def test_a_run_goes_on_only_with_what_its_checkpoint_holds(
+    tmp_path: Path, change: dict[str, Any], telling: str
+) -> None:
+    plan = _plan(tmp_path, steps=4, warmup_steps=1, optimizer="adamw")
+    train_detector(plan, tmp_path / "run", _Heard().listener())
+    other = replace(plan, params=replace(plan.params, **change))
+    with pytest.raises(ConfigError, match=telling):
+        train_detector(other, tmp_path / "run", _Heard().listener(), resumes=True)
+
+
+def test_a_run_that_goes_on_for_longer_says_so_in_its_record(tmp_path: Path) -> None:
+    plan = _plan(tmp_path, steps=4, warmup_steps=1)
+    train_detector(plan, tmp_path / "run", _Heard().listener())
+    longer = replace(plan, params=replace(plan.params, steps=6))
+    assert train_detector(longer, tmp_path / "run", _Heard().listener(), resumes=True).step == 6
+    assert read_run(tmp_path / "run") == longer.to_dict()
 
 
 def test_only_a_data_set_that_is_there_can_be_turned_freely(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ from standoff.training.darknet.network import DarknetNetwork
 from standoff.training.darknet.weights import WeightsHeader, load_weights, save_weights
 from standoff.training.start.blend import blend_weights
 from standoff.training.start.initial_weights import initialize_layers
+from standoff.training.start.transfer import transfer_weights
 
 
 def write_weights(folder: Path, name: str, seed: int, seen: int = 0) -> tuple[Path, DarknetNetwork]:
@@ -26,6 +27,19 @@ def write_weights(folder: Path, name: str, seed: int, seen: int = 0) -> tuple[Pa
 def _read(folder: Path, name: str) -> tuple[DarknetNetwork, WeightsHeader]:
     network = DarknetNetwork(parse_cfg(CFG, "small.cfg"))
     return network, load_weights(network, folder / name)
+
+
+def test_a_cut_file_is_the_head_of_the_whole_one(tmp_path: Path) -> None:
+    (path, network), cfg = write_weights(tmp_path, "a.weights", 1), tmp_path / "small.cfg"
+    convolutions = [index for index, _ in network.convolutions()]
+    blend_weights(cfg, [(path, 1.0)], tmp_path / "cut.weights", convolutions[1])
+    cut = (tmp_path / "cut.weights").read_bytes()
+    assert path.read_bytes().startswith(cut)
+    other, _ = write_weights(tmp_path, "b.weights", 2)[1], None
+    transferred = transfer_weights(other, tmp_path / "cut.weights", cfg)
+    assert transferred.copied == tuple(convolutions[:1])
+    with pytest.raises(ConfigError, match="fewer layers than"):
+        blend_weights(cfg, [(path, 1.0)], tmp_path / "cut.weights", len(network.cfg.layers))
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3, 1.0])

@@ -61,7 +61,7 @@ def test_weights_of_the_same_cfg_are_copied_whole(tmp_path: Path) -> None:
     target = _network(yolov3_tiny_cfg(5, 64, 64))
     transferred = transfer_weights(target, tmp_path / "a.weights")
     assert (len(transferred.copied), transferred.resized, transferred.fresh) == (13, (), ())
-    assert transferred.source == "all 13 convolutions, in a.weights"
+    assert transferred.source == "yolov3-tiny with 5 classes, in a.weights"
     assert torch.equal(_rows(target), _rows(source))
 
 
@@ -107,6 +107,15 @@ def test_other_anchors_start_from_the_nearest_and_say_its_boxes(tmp_path: Path) 
     target = _network(yolo_fastest_xl_cfg(80, 96, 64, OTHER_ANCHORS_PX))
     transfer_weights(target, tmp_path / "coco.weights", tmp_path / "coco.cfg")
     # Coarse head first; of its anchors (115, 73), (119, 199), (242, 238) these are the nearest to 60 x 140 and so on.
+    found, expected = _rows(target)[:18].reshape(6, 3, -1), _rows(source)[:18].reshape(6, 3, -1)[:, [1, 0, 2]]
+    torch.testing.assert_close(found, expected)
+
+
+def test_published_weights_keep_their_own_anchors_where_the_classes_are_as_many(tmp_path: Path) -> None:
+    source = _trained(yolo_fastest_xl_cfg(80, 96, 64), tmp_path / "coco.weights")
+    target = _network(yolo_fastest_xl_cfg(80, 96, 64, OTHER_ANCHORS_PX))
+    transferred = transfer_weights(target, tmp_path / "coco.weights")
+    assert transferred.resized == (120, 129)
     found, expected = _rows(target)[:18].reshape(6, 3, -1), _rows(source)[:18].reshape(6, 3, -1)[:, [1, 0, 2]]
     torch.testing.assert_close(found, expected)
 

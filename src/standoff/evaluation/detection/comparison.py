@@ -10,6 +10,7 @@ from standoff.evaluation.detection.bootstrap import Chance, Interval, resample_g
 from standoff.evaluation.detection.material import Material
 from standoff.evaluation.detection.trial import TrialResult
 from standoff.evaluation.timing import machine
+from standoff.labels.types import Problem
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -23,6 +24,7 @@ class Comparison:
         results: Of each model, in the order given.
         chance: 95 % intervals of the mean AP; None with too few groups.
         thresholds: Scores at which precision and recall are reported besides.
+        problems: Of the labels and the pictures; no model was asked about what is left out.
     """
 
     material: str
@@ -31,6 +33,7 @@ class Comparison:
     results: tuple[TrialResult, ...]
     chance: Chance | None
     thresholds: tuple[float, ...] = ()
+    problems: tuple[Problem, ...] = ()
 
     def interval(self, row: int) -> Interval | None:
         """Return the interval of a model's mean AP, if there is one."""
@@ -42,6 +45,7 @@ class Comparison:
             "data": self.material,
             "pictures": self.pictures,
             "groups": self.groups,
+            "problems": [f"{problem.path}: {problem.found}" for problem in self.problems],
             "machine": machine(),
             "difference_95_of_the_first_two": asdict(self.chance.difference)
             if self.chance and self.chance.difference
@@ -71,4 +75,5 @@ def compare(material: Material, results: Sequence[TrialResult], thresholds: Sequ
         results=tuple(results),
         chance=resample_groups([result.score.matches for result in results], groups),
         thresholds=tuple(thresholds),
+        problems=material.problems,
     )

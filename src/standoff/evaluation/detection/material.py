@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -17,9 +19,10 @@ from standoff.evaluation.paper.clip_tables import read_table
 from standoff.evaluation.positions_input import read_truth
 from standoff.labels import load_picture, read_data
 from standoff.labels.marking import would_be_marked
+from standoff.labels.problems import readable_pictures
 from standoff.labels.site_classes import to_site_classes
 from standoff.labels.splits import spread_rows
-from standoff.labels.types import LabelledPicture, Split
+from standoff.labels.types import LabelledPicture, Problem, Split
 from standoff.stages.frames import frame_from_array, open_source
 
 _VISIBLE = ("frame", "entity_id", "class_id", "x1_px", "y1_px", "x2_px", "y2_px", "visible_share", "visible_px")
@@ -35,6 +38,7 @@ class Material:
         frames: Starts to read the pictures, in the order of `truth`.
         frame_index: (N,) position of each in its video; of each picture in the split without one.
         clip: The simulated clip that they are from; None otherwise.
+        problems: Of the labels and the pictures; what is left out is in no other field.
     """
 
     name: str
@@ -42,21 +46,30 @@ class Material:
     frames: Callable[[], Iterator[Frame]]
     frame_index: IntArray
     clip: Clip | None = None
+    problems: tuple[Problem, ...] = ()
 
 
-def labelled_pictures(path: Path, split: Split, limit: int | None = None) -> Material:
-    """Take one split of a data set.
+def labelled_pictures(
+    path: Path,
+    split: Split | Literal["all"] | None,
+    limit: int | None = None,
+    on_picture: Callable[[], None] = lambda: None,
+) -> Material:
+    """Take one split of a data set, less the pictures that cannot be decoded.
 
     Args:
         path: What `standoff.labels.read_data` reads.
-        split: Which.
+        split: Which; "all" of it; None: "test", but "all" where nothing says what is held out.
         limit: Take so many pictures only, evenly spread; None: all.
+        on_picture: Called after each one that was tried.
 
     Raises:
-        DataError: It cannot be read, or the split has no picture.
+        DataError: It cannot be read, or the split has no picture that can be decoded.
     """
     data = to_site_classes(read_data(path))
-    pictures = data.splits.get(split, ())
+    split = split or ("test" if data.is_divided else "all")
+    every = sorted(chain.from_iterable(data.splits.values()), key=lambda picture: picture.path)
+    pictures = every if split == "all" else data.splits[split]
     if not pictures:
         counts = ", ".join(f"{len(some)} in {name}" for name, some in data.splits.items() if some)
         raise DataError(
@@ -64,14 +77,23 @@ def labelled_pictures(path: Path, split: Split, limit: int | None = None) -> Mat
             found=counts or "no picture at all",
             fix="choose another split with --split" if counts else "check the path",
         )
-    chosen = spread_rows(len(pictures), limit)
-    truth = tuple(pictures[row] for row in chosen)
+    rows = spread_rows(len(pictures), limit)
+    truth, unreadable = readable_pictures([pictures[row] for row in rows], on_picture)
+    if not truth:
+        raise DataError(
+            expected=f"pictures in the split {split} of {path} that can be decoded",
+            found=f"none of {len(rows)}, the first {unreadable[0].path}: {unreadable[0].found}",
+            fix="restore the files",
+        )
+    left_out = {problem.path for problem in unreadable}
+    chosen = np.array([row for row in rows if pictures[row].path not in left_out], dtype=np.int64)
 
     def frames() -> Iterator[Frame]:
         for index, picture in enumerate(truth):
             yield frame_from_array(load_picture(picture), index=index, stream_id=picture.path.name)
 
-    return Material(f"{path.resolve().name}, {split}", truth, frames, chosen)
+    name = f"{path.resolve().name}, {split}"
+    return Material(name, truth, frames, chosen, problems=(*data.problems, *unreadable))
 
 
 def simulated_clip(folder: Path, limit: int | None = None) -> Material:
@@ -136,7 +158,13 @@ def video_with_people(
 
 
 def open_material(
-    path: Path, *, split: Split, video: Path | None, frames: tuple[int, int] | None, limit: int | None
+    path: Path,
+    *,
+    split: Split | Literal["all"] | None,
+    video: Path | None,
+    frames: tuple[int, int] | None,
+    limit: int | None,
+    on_picture: Callable[[], None] = lambda: None,
 ) -> Material:
     """Take whatever kind of data there is at a path: a clip folder, a CSV table with its video, or labelled pictures.
 
@@ -155,7 +183,7 @@ def open_material(
         )
     if (path / "truth.parquet").is_file():
         return simulated_clip(path, limit)
-    return labelled_pictures(path, split, limit)
+    return labelled_pictures(path, split, limit, on_picture)
 
 
 def _size_px(video: Path) -> tuple[int, int]:

@@ -26,6 +26,7 @@ from typing import Any, Final, Literal, get_args
 
 import yaml
 
+from standoff.core.classes import names_by_line
 from standoff.core.errors import ModelError
 from standoff.stages.detect.letterbox import DARKNET, Colour, Placement, Preprocessing
 
@@ -110,8 +111,7 @@ def _interface(said: dict[str, Any], graph_size_px: tuple[int, int] | None, path
 
 
 def _labels(path: Path) -> tuple[str, ...]:
-    lines = (line.strip() for line in path.read_text(encoding="utf-8").splitlines())
-    labels = tuple(line for line in lines if line)
+    labels = names_by_line(path.read_text(encoding="utf-8"))
     if not labels:
         raise ValueError(f"no label in {path.name}")
     return labels

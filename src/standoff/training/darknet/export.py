@@ -9,6 +9,7 @@ import warnings
 from dataclasses import replace
 from pathlib import Path
 
+from standoff.core.classes import names_by_line
 from standoff.core.errors import ModelError
 from standoff.stages.detect.model_card import INPUT_NAME, OUTPUT_NAME, ModelCard, file_sha256
 from standoff.stages.sinks.whole import whole_file
@@ -64,10 +65,15 @@ def read_names(path: Path, network: DarknetCfg) -> tuple[str, ...]:
     """Read a names file, one class a line.
 
     Raises:
-        ModelError: It cannot be read, or has another number of names than the network has classes.
+        ModelError: It cannot be read, has an empty line between names, or another number of names than the network has
+            classes.
     """
-    lines = read_text(path, "a names file").splitlines()
-    names = tuple(line.strip() for line in lines if line.strip())
+    text = read_text(path, "a names file")
+    try:
+        names = names_by_line(text)
+    except ValueError as error:
+        expected = f"a name a line in {path.name}"
+        raise ModelError(expected=expected, found=str(error), fix="correct the file") from error
     classes = network.heads[0].classes
     if len(names) != classes:
         raise ModelError(

@@ -15,6 +15,7 @@ from standoff.core.errors import DataError
 from standoff.core.homography import FloatArray
 from standoff.core.types import ImageArray
 from standoff.labels import LabelledPicture, Problem, load_picture
+from standoff.labels.types import UNREADABLE
 from standoff.training.pictures.augment import AugmentParams, Sample, make_sample
 
 
@@ -105,7 +106,7 @@ class _Steps(Dataset[Batch | DataError]):
             try:
                 return load_picture(picture, reduction)
             except DataError as error:
-                problems.append(Problem(picture.path, error.found, "unreadable picture", skipped_picture=True))
+                problems.append(Problem(picture.path, error.found, UNREADABLE, skipped_picture=True))
                 raise
 
         try:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, suppress
+from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -16,6 +16,7 @@ from typing_extensions import Doc
 
 from standoff.core.errors import DataError, ModelError
 from standoff.labels import LabelledData, LabelledPicture, Split, load_picture
+from standoff.labels.problems import readable_pictures
 from standoff.labels.splits import spread
 from standoff.stages.detect.letterbox import Letterbox
 from standoff.stages.frames import frame_from_array
@@ -144,7 +145,13 @@ def quantize_model(
         raise ModelError(expected=f"a float model in {model.name}", found="an int8 model", fix="give the float model")
     chosen, deciding = divide_pictures(data, plan)
     with progress("pictures to calibrate with", len(chosen)) as step:
-        calibrating = _readable(chosen, step)
+        calibrating, lost = readable_pictures(chosen, step)
+    if not calibrating:
+        raise DataError(
+            expected="pictures to calibrate with that can be decoded",
+            found=f"none of {len(chosen)}",
+            fix="check the files",
+        )
     with whole_file(out) as path:
         with progress("float model", len(deciding)) as step:
             gate = Gate(model, deciding, step)
@@ -157,7 +164,7 @@ def quantize_model(
             layers=len(search.network.layers),
             calibration_pictures=len(calibrating),
             deciding_pictures=len(gate),
-            unreadable=tuple(gate.unreadable),
+            unreadable=(*(problem.path for problem in lost), *gate.unreadable),
             size_bytes=(model.stat().st_size, path.stat().st_size),
             median_ms=gate.median_ms(path),
         )
@@ -205,27 +212,6 @@ def divide_pictures(
             fix="choose another --split, or add pictures",
         )
     return spread(calibrating, plan.calibration_pictures), deciding
-
-
-def _readable(pictures: Sequence[LabelledPicture], step: Step) -> tuple[LabelledPicture, ...]:
-    """Return the pictures that can be decoded.
-
-    Raises:
-        DataError: None can.
-    """
-    readable = []
-    for picture in pictures:
-        step()
-        with suppress(DataError):
-            load_picture(picture)
-            readable.append(picture)
-    if not readable:
-        raise DataError(
-            expected="pictures to calibrate with that can be decoded",
-            found=f"none of {len(pictures)}",
-            fix="check the files",
-        )
-    return tuple(readable)
 
 
 class _Search:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import pickle
 import zipfile
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import torch
 
-from standoff.core.errors import DataError
+from standoff.core.errors import DataError, OutputError
 
 _KEPT = 2
 """The last good one must still be there when the newest was cut short."""
@@ -23,12 +24,25 @@ def save_checkpoint(folder: Path, step: int, state: dict[str, Any]) -> None:
         folder: Made if need be.
         step: Steps done.
         state: Tensors, numbers, texts, and lists and mappings of them.
+
+    Raises:
+        OutputError: It cannot be written; the older ones are still there.
     """
-    folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"step-{step:07d}.pt"
     partial = path.with_suffix(".partial")
-    torch.save(state, partial)
-    partial.replace(path)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        torch.save(state, partial)
+        partial.replace(path)
+    # torch's own writer raises RuntimeError where the disk is full.
+    except (OSError, RuntimeError) as error:
+        with suppress(OSError):
+            partial.unlink(missing_ok=True)
+        raise OutputError(
+            expected=f"to write the checkpoint {path}",
+            found=str(error).splitlines()[0],
+            fix="make room or give write permission, and go on with --resume",
+        ) from error
     for older in sorted(folder.glob("step-*.pt"))[:-_KEPT]:
         older.unlink()
 

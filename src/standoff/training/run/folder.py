@@ -85,11 +85,19 @@ class RunFolder:
             write_json(self.path / "start.json", {"standoff": __version__, **facts})
             save_weights(network, self.path / "start.weights")
             # The last: where it is, the others are.
-            self._write_text("run.yaml", yaml.safe_dump(plain(configuration), sort_keys=False))
+            self.write_plan(configuration)
         except OSError as error:
             raise OutputError(
                 expected=f"to write to {self.path}", found=str(error.strerror), fix="choose a folder that is writable"
             ) from error
+
+    def write_plan(self, configuration: dict[str, Any]) -> None:
+        """Write `run.yaml`, which repeats the run.
+
+        Raises:
+            OutputError: It cannot be written.
+        """
+        self._write_text("run.yaml", yaml.safe_dump(plain(configuration), sort_keys=False))
 
     def read_start(self) -> dict[str, Any]:
         """Read the facts again.

@@ -6,12 +6,13 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from time import monotonic
-from typing import Any
+from typing import Any, Final
 
 from standoff.core.errors import ConfigError, DataError, ModelError
 from standoff.evaluation.detection import DetectionScore
 from standoff.labels import LabelledData, Problem, read_data
 from standoff.labels.near_duplicates import near_duplicates
+from standoff.labels.problems import problem_lines, readable_pictures
 from standoff.labels.splits import require_splits, spread
 from standoff.labels.summary import summarise
 from standoff.stages.detect.model_card import file_sha256
@@ -26,6 +27,11 @@ from standoff.training.run.loop import Progress, Trainer, Watcher
 from standoff.training.run.memory import keep_freed_memory
 from standoff.training.run.params import TrainParams
 from standoff.training.start.starting_point import backbone_of, compose_cfg, fill_network
+
+_MAY_CHANGE: Final = frozenset(
+    {"accumulate", "batch", "checkpoint_every", "patience", "steps", "validate_every", "validate_pictures", "workers"}
+)
+"""Settings of a run that is resumed; the others are in the state that its checkpoint holds, or would cut its curve."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +76,8 @@ def train_detector(plan: RunPlan, out: Path, listener: Listener, *, resumes: boo
     """Train a detector.
 
     Args:
-        plan: What to do. A run that is resumed must have been started with the same.
+        plan: What to do. A run that is resumed must have been started with the same but for its length, its batch, and
+            how often it is validated and saved.
         out: Folder of the run.
         listener: Hears of it.
         resumes: Go on with the run in the folder.
@@ -86,26 +93,22 @@ def train_detector(plan: RunPlan, out: Path, listener: Listener, *, resumes: boo
     if leads and not resumes:
         refuse_used(out)
     data = read_data(plan.data)
-    _report_problems(data, listener, leads=leads)
+    if leads:
+        _report_problems(data, plan.params, listener)
     _require_usable(data, plan.params)
     folder = RunFolder(out, data.classes)
     if resumes:
-        network, backbone_layers = _resumed(folder, plan.params)
+        network, backbone_layers = _resumed(folder, plan, leads=leads)
     else:
         network, backbone_layers = _started(plan, data, folder, listener, leads=leads)
     trainer = Trainer(network, data, plan.params, folder.checkpoints, plan.params.backbone_layers or backbone_layers)
     if resumes:
         for name in trainer.resume():
             listener.on_message(f"{name} is damaged and was passed over: going on from step {trainer.progress.step}")
-    unreadable: set[Path] = set()
-
-    def on_bad_picture(problem: Problem) -> None:
-        if problem.path not in unreadable:
-            unreadable.add(problem.path)
-            listener.on_message(f"skipped {problem.path}: {problem.found}")
+    unreadable = _Unreadable(listener)
 
     def on_validation(progress: Progress, score: DetectionScore, shown: DarknetNetwork) -> None:
-        seen = progress.step * plan.params.batch * plan.params.accumulate
+        seen = progress.step * plan.params.batch * plan.params.accumulate * Crew.join().size
         folder.write_validation(progress, score, shown, data.splits["val"], seen)
         listener.on_row(progress.rows[-1])
 
@@ -114,10 +117,28 @@ def train_detector(plan: RunPlan, out: Path, listener: Listener, *, resumes: boo
     def on_step(step: int, loss: float) -> None:
         listener.on_step(step, loss, (step - first) / (monotonic() - started_s))
 
-    progress = trainer.run(Watcher(on_step, on_validation, on_bad_picture))
+    progress = trainer.run(Watcher(on_step, on_validation, unreadable.hear))
+    unreadable.sum_up()
     if leads:
         _write_results(plan, data, folder, progress, listener)
     return progress
+
+
+class _Unreadable:
+    """Names each picture that cannot be decoded once, and counts them."""
+
+    def __init__(self, listener: Listener) -> None:
+        self._listener = listener
+        self._paths: set[Path] = set()
+
+    def hear(self, problem: Problem) -> None:
+        if problem.path not in self._paths:
+            self._paths.add(problem.path)
+            self._listener.on_message(f"skipped {problem.path}: {problem.found}")
+
+    def sum_up(self) -> None:
+        if self._paths:
+            self._listener.on_message(f"{len(self._paths)} pictures were skipped; others were shown in their place")
 
 
 def _require_usable(data: LabelledData, params: TrainParams) -> None:
@@ -165,6 +186,7 @@ def _started(
         "weights_sha256": None if plan.weights is None else file_sha256(plan.weights),
         "transferred": asdict(transferred),
         "backbone_layers": backbone_of(network, transferred),
+        "problems": [f"{problem.path}: {problem.found}" for problem in data.problems],
     }
     if leads:
         layers = len(transferred.copied), len(transferred.resized), len(transferred.fresh)
@@ -175,7 +197,7 @@ def _started(
     return network, backbone_of(network, transferred)
 
 
-def _resumed(folder: RunFolder, params: TrainParams) -> tuple[DarknetNetwork, int]:
+def _resumed(folder: RunFolder, plan: RunPlan, *, leads: bool) -> tuple[DarknetNetwork, int]:
     cfg = read_cfg(folder.cfg)
     facts = folder.read_start()
     classes = folder.read_classes()
@@ -185,22 +207,31 @@ def _resumed(folder: RunFolder, params: TrainParams) -> tuple[DarknetNetwork, in
             found=f"{', '.join(folder.classes)} in the data",
             fix="give the same data, or start a new run",
         )
-    if (cfg.width_px, cfg.height_px) != params.size_px:
-        raise ConfigError(
-            expected=f"size_px {cfg.width_px}x{cfg.height_px}, with which {folder.path} was started",
-            found="{}x{}".format(*params.size_px),
-            fix="leave it as it was, or start a new run",
-        )
+    before, now = (_flat(one["train"]) for one in (read_run(folder.path), plan.to_dict()))
+    for name in sorted(now.keys() & before.keys() - _MAY_CHANGE):
+        if now[name] != before[name]:
+            raise ConfigError(
+                expected=f"{name} {before[name]}, with which {folder.path} was started",
+                found=f"{now[name]}",
+                fix=f"leave it as it was (only {', '.join(sorted(_MAY_CHANGE))} may change), or start a new run",
+            )
+    if leads:
+        folder.write_plan(plan.to_dict())
     return DarknetNetwork(cfg), int(facts["backbone_layers"])
 
 
-def _report_problems(data: LabelledData, listener: Listener, *, leads: bool) -> None:
-    kinds: dict[str, list[Problem]] = {}
-    for problem in data.problems if leads else ():
-        kinds.setdefault(problem.kind, []).append(problem)
-    for kind, problems in kinds.items():
-        example = problems[0]
-        listener.on_message(f"{len(problems)} times {kind}, first {example.path}: {example.found}")
+def _flat(settings: dict[str, Any], before: str = "") -> dict[str, Any]:
+    """Return settings by dotted name."""
+    flat: dict[str, Any] = {}
+    for name, value in settings.items():
+        flat |= _flat(value, f"{before}{name}.") if isinstance(value, dict) else {f"{before}{name}": value}
+    return flat
+
+
+def _report_problems(data: LabelledData, params: TrainParams, listener: Listener) -> None:
+    _, unreadable = readable_pictures(spread(data.splits["val"], params.validate_pictures), lambda: None)
+    for line in problem_lines([*data.problems, *unreadable]):
+        listener.on_message(line)
 
 
 def _report_near_duplicates(data: LabelledData, listener: Listener) -> None:

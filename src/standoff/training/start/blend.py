@@ -24,16 +24,18 @@ from standoff.training.darknet.weights import WeightsHeader, load_weights, save_
 _SUM_TOLERANCE = 1e-6
 
 
-def blend_weights(cfg: Path, parts: Sequence[tuple[Path, float]], out: Path) -> None:
+def blend_weights(cfg: Path, parts: Sequence[tuple[Path, float]], out: Path, first_layers: int | None = None) -> None:
     """Write the weighted mean of Darknet weights.
 
     Args:
         cfg: That all of them belong to.
         parts: Each file, and its share; the shares add up to 1.
         out: Weights file to write; its `seen` is the largest of the parts'.
+        first_layers: Write those of the first so many layers only; None: all.
 
     Raises:
-        ConfigError: There is no part, a share is negative, or the shares do not add up to 1.
+        ConfigError: There is no part, a share is negative, the shares do not add up to 1, or the network has no
+            more layers than `first_layers`.
         ModelError: A file does not belong to the cfg.
         OutputError: The file cannot be written.
     """
@@ -45,6 +47,12 @@ def blend_weights(cfg: Path, parts: Sequence[tuple[Path, float]], out: Path) -> 
             fix="write for example start.weights=0.3 best.weights=0.7",
         )
     description = read_cfg(cfg)
+    if first_layers is not None and first_layers >= len(description.layers):
+        raise ConfigError(
+            expected=f"fewer layers than the {len(description.layers)} of {cfg.name}",
+            found=str(first_layers),
+            fix="leave --layers out to write all of them",
+        )
     blended, network = DarknetNetwork(description), DarknetNetwork(description)
     mean = {name: torch.zeros_like(value, dtype=torch.float64) for name, value in blended.state_dict().items()}
     seen = 0
@@ -53,4 +61,6 @@ def blend_weights(cfg: Path, parts: Sequence[tuple[Path, float]], out: Path) -> 
         for name, value in network.state_dict().items():
             mean[name] += share * value.double()
     blended.load_state_dict({name: value.to(blended.state_dict()[name].dtype) for name, value in mean.items()})
-    save_weights(blended, out, WeightsHeader(seen=seen))
+    # Layers are numbered from 0: 74 of them end with number 73, where Darknet's own `partial` stops.
+    cut = None if first_layers is None else first_layers - 1
+    save_weights(blended, out, WeightsHeader(seen=seen), cut_after_layer=cut)
