@@ -42,6 +42,7 @@ def test_an_empty_label_file_is_a_picture_without_objects(tmp_path: Path) -> Non
         ("-1 0.5 0.5 0.5 0.5\n", "unknown class id"),
         ("0.5 0.5 0.5 0.5 0.5\n", "unknown class id"),
         (_GOOD + "1 0.5 0.5 0.5 0.5\n", "contradictory labels"),
+        (_GOOD + "1 0.501 0.499 0.5 0.5\n", "contradictory labels"),
     ],
 )
 def test_bad_labels_cost_their_picture(tmp_path: Path, content: str | bytes, kind: str) -> None:
@@ -55,6 +56,7 @@ def test_bad_labels_cost_their_picture(tmp_path: Path, content: str | bytes, kin
     ("content", "kind", "left"),
     [
         (_GOOD + _GOOD, "box marked twice", [[9.5, 7.0, 29.5, 22.0]]),
+        (_GOOD + "0 0.501 0.499 0.5 0.5\n", "box marked twice", [[9.5, 7.0, 29.5, 22.0]]),
         (_GOOD + "0 0.5 0.5 0 0.5\n", "box without area", [[9.5, 7.0, 29.5, 22.0]]),
         (_GOOD + "0 0.5 0.5 -0.1 0.5\n", "box without area", [[9.5, 7.0, 29.5, 22.0]]),
         (_GOOD + "0 1.5 0.5 0.5 0.5\n", "box outside the picture", [[9.5, 7.0, 29.5, 22.0]]),

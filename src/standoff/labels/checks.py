@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 
+from standoff.core.boxes import overlaps
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import IntArray
 from standoff.labels.source import BadPicture, SourcePicture
@@ -16,8 +17,8 @@ from standoff.labels.types import Problem
 _ROUNDING_PX: Final = 1.0
 """Boxes at the picture's edge stick out by this much because they were rounded; that is no mistake."""
 _MIN_SIDE_PX: Final = 0.5
-_SAME_PX: Final = 0.01
-"""YOLO's six digits are 0.002 px of a 2000 px picture."""
+_SAME_IOU: Final = 0.95
+"""Nobody marks two things so alike; two passes over the same picture mark one thing so."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,8 +54,8 @@ def check_boxes(picture: SourcePicture, class_ids: Mapping[str, int | None]) -> 
     ignored = picture.ignored[kept] | np.array([number is None for number in ids], np.bool_)
     xyxy_px = picture.xyxy_px[kept]
 
-    first = _first_of_each(picture, xyxy_px, class_id, ignored)
     cut_px = inside(xyxy_px, picture.size_px)
+    first = _first_of_each(picture, cut_px, class_id, ignored)
     real = _has_area(xyxy_px)
     visible = real & _has_area(cut_px)
     cut = visible & (np.abs(cut_px - xyxy_px).max(axis=1, initial=0.0) > _ROUNDING_PX)
@@ -81,12 +82,12 @@ def inside(xyxy_px: FloatArray, size_px: tuple[int, int]) -> FloatArray:
 def _first_of_each(picture: SourcePicture, xyxy_px: FloatArray, class_id: IntArray, ignored: BoolArray) -> BoolArray:
     """Return False for repetitions of a box; ignored regions may repeat one."""
     first = np.ones(len(xyxy_px), np.bool_)
-    seen: dict[tuple[float, ...], int] = {}
-    for row, corners in enumerate(np.rint(xyxy_px / _SAME_PX).tolist()):
-        if ignored[row]:
+    rows, others = np.nonzero(np.tril(overlaps(xyxy_px, xyxy_px) >= _SAME_IOU, -1))
+    for row, other in zip(rows.tolist(), others.tolist(), strict=True):
+        if ignored[row] or ignored[other]:
             continue
-        first[row] = tuple(corners) not in seen
-        if seen.setdefault(tuple(corners), int(class_id[row])) != class_id[row]:
+        first[row] = False
+        if class_id[row] != class_id[other]:
             raise BadPicture(picture.path, "one box with two classes", "contradictory labels")
     return first
 

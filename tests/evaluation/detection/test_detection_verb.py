@@ -155,7 +155,7 @@ def test_where_nothing_says_what_is_held_out_everything_is_scored(cells: Path, m
     whole = json.loads(evaluate(*words))
     assert (whole["pictures"], whole["data"]) == (SCENES, "plain, all")
     assert json.loads(evaluate(*words, "--split", "test"))["pictures"] < SCENES
-    assert json.loads(evaluate("--data", cells, *words[2:]))["data"] == "cells, test"
+    assert json.loads(evaluate("--data", cells, *words[2:]))["data"].endswith(", test")
 
 
 def test_markdown_is_tables_and_figures_are_pictures(cells: Path, model: Path, tmp_path: Path) -> None:
