@@ -42,7 +42,7 @@ def test_an_empty_label_file_is_a_picture_without_objects(tmp_path: Path) -> Non
         ("-1 0.5 0.5 0.5 0.5\n", "unknown class id"),
         ("0.5 0.5 0.5 0.5 0.5\n", "unknown class id"),
         (_GOOD + "1 0.5 0.5 0.5 0.5\n", "contradictory labels"),
-        (_GOOD + "1 0.501 0.499 0.5 0.5\n", "contradictory labels"),
+        (_GOOD + "1 0.5005 0.4995 0.5 0.5\n", "contradictory labels"),
     ],
 )
 def test_bad_labels_cost_their_picture(tmp_path: Path, content: str | bytes, kind: str) -> None:

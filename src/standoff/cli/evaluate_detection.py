@@ -75,6 +75,12 @@ def detection(
         material = open_material(
             data, split=split, video=video, frames=frame_range(frames), limit=limit, on_picture=on_picture
         )
+    if split is None and material.is_whole:
+        typer.echo(
+            "nothing says what is held out: all pictures are scored, also those that `standoff train` learns from "
+            "(it holds out --split val)",
+            err=True,
+        )
     for line in problem_lines(material.problems):
         typer.echo(line, err=True)
     comparison = _compare(candidates, material, grouping, iou, at or [])

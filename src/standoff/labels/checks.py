@@ -17,8 +17,10 @@ from standoff.labels.types import Problem
 _ROUNDING_PX: Final = 1.0
 """Boxes at the picture's edge stick out by this much because they were rounded; that is no mistake."""
 _MIN_SIDE_PX: Final = 0.5
-_SAME_IOU: Final = 0.95
-"""Nobody marks two things so alike; two passes over the same picture mark one thing so."""
+_TWICE_IOU: Final = 0.95
+"""Nobody marks two things of a class so alike; two passes over the same picture mark one thing so."""
+_CONTRADICTORY_IOU: Final = 0.99
+"""Of two classes: a rider and what is ridden may be nearly one box."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,13 +84,12 @@ def inside(xyxy_px: FloatArray, size_px: tuple[int, int]) -> FloatArray:
 def _first_of_each(picture: SourcePicture, xyxy_px: FloatArray, class_id: IntArray, ignored: BoolArray) -> BoolArray:
     """Return False for repetitions of a box; ignored regions may repeat one."""
     first = np.ones(len(xyxy_px), np.bool_)
-    rows, others = np.nonzero(np.tril(overlaps(xyxy_px, xyxy_px) >= _SAME_IOU, -1))
-    for row, other in zip(rows.tolist(), others.tolist(), strict=True):
-        if ignored[row] or ignored[other]:
-            continue
-        first[row] = False
-        if class_id[row] != class_id[other]:
+    for row in np.flatnonzero(~ignored).tolist():
+        alike = overlaps(xyxy_px[row : row + 1], xyxy_px[:row])[0]
+        same_class = class_id[:row] == class_id[row]
+        if (alike[~same_class & ~ignored[:row]] >= _CONTRADICTORY_IOU).any():
             raise BadPicture(picture.path, "one box with two classes", "contradictory labels")
+        first[row] = not (alike[same_class & ~ignored[:row]] >= _TWICE_IOU).any()
     return first
 
 

@@ -16,6 +16,7 @@ _NAMED: Final = 3
 def problem_lines(problems: Sequence[Problem]) -> list[str]:
     """Return a line for each kind of problem: how often, and the first few files.
 
+    >>> from pathlib import Path
     >>> problem_lines([Problem(Path("a.txt"), "class id 9, of 7 classes", "unknown class id", skipped_picture=False)])
     ['1 times unknown class id: a.txt: class id 9, of 7 classes']
     """

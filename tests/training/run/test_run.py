@@ -193,6 +193,7 @@ def test_a_run_goes_on_only_with_its_classes_and_its_size(tmp_path: Path) -> Non
     [
         ({"optimizer": "sgd"}, "optimizer adamw"),
         ({"weight_decay": 0.1}, "weight_decay"),
+        ({"validate_pictures": 1}, "validate_pictures"),
         ({"backbone_layers": 3}, "backbone_layers 0"),
         ({"augment": replace(QUIET, mosaic=0.5)}, r"augment\.mosaic"),
     ],
@@ -213,6 +214,10 @@ def test_a_run_that_goes_on_for_longer_says_so_in_its_record(tmp_path: Path) -> 
     longer = replace(plan, params=replace(plan.params, steps=6))
     assert train_detector(longer, tmp_path / "run", _Heard().listener(), resumes=True).step == 6
     assert read_run(tmp_path / "run") == longer.to_dict()
+    before = yaml.safe_load((tmp_path / "run" / "run-until-4.yaml").read_text())
+    assert before == plan.to_dict()
+    header = load_weights(DarknetNetwork(read_cfg(tmp_path / "run" / "network.cfg")), tmp_path / "run" / "last.weights")
+    assert header.seen == 6 * plan.params.batch * plan.params.accumulate
 
 
 def test_only_a_data_set_that_is_there_can_be_turned_freely(tmp_path: Path) -> None:
@@ -272,7 +277,7 @@ def test_a_validation_of_which_nothing_can_be_shown_is_still_written(
     score = validate(network, pictures, CLASSES, bf16=False)
     lost = tuple(replace(picture, path=tmp_path / "gone.png") for picture in pictures)
     progress = Progress(step=30, best_step=30, rows=heard.rows[:1])
-    RunFolder(tmp_path, CLASSES).write_validation(progress, score, network, lost, 0)
+    RunFolder(tmp_path, CLASSES).write_validation(progress, score, network, lost)
     assert (tmp_path / "best.weights").is_file() and not (tmp_path / "predictions.jpg").exists()
 
 

@@ -61,7 +61,7 @@ def test_weights_of_the_same_cfg_are_copied_whole(tmp_path: Path) -> None:
     target = _network(yolov3_tiny_cfg(5, 64, 64))
     transferred = transfer_weights(target, tmp_path / "a.weights")
     assert (len(transferred.copied), transferred.resized, transferred.fresh) == (13, (), ())
-    assert transferred.source == "yolov3-tiny with 5 classes, in a.weights"
+    assert transferred.source == "all 13 convolutions, in a.weights"
     assert torch.equal(_rows(target), _rows(source))
 
 
@@ -118,6 +118,13 @@ def test_published_weights_keep_their_own_anchors_where_the_classes_are_as_many(
     assert transferred.resized == (120, 129)
     found, expected = _rows(target)[:18].reshape(6, 3, -1), _rows(source)[:18].reshape(6, 3, -1)[:, [1, 0, 2]]
     torch.testing.assert_close(found, expected)
+
+
+def test_weights_of_a_run_keep_its_anchors_without_a_cfg_beside_them(tmp_path: Path) -> None:
+    source = _trained(yolo_fastest_xl_cfg(5, 96, 64, OTHER_ANCHORS_PX), tmp_path / "run.weights")
+    target = _network(yolo_fastest_xl_cfg(5, 96, 64, OTHER_ANCHORS_PX))
+    assert transfer_weights(target, tmp_path / "run.weights").resized == ()
+    torch.testing.assert_close(_rows(target), _rows(source))
 
 
 def test_an_anchor_may_serve_several(tmp_path: Path) -> None:

@@ -39,6 +39,7 @@ class Material:
         frame_index: (N,) position of each in its video; of each picture in the split without one.
         clip: The simulated clip that they are from; None otherwise.
         problems: Of the labels and the pictures; what is left out is in no other field.
+        is_whole: All splits of a data set.
     """
 
     name: str
@@ -47,6 +48,7 @@ class Material:
     frame_index: IntArray
     clip: Clip | None = None
     problems: tuple[Problem, ...] = ()
+    is_whole: bool = False
 
 
 def labelled_pictures(
@@ -93,7 +95,8 @@ def labelled_pictures(
             yield frame_from_array(load_picture(picture), index=index, stream_id=picture.path.name)
 
     name = f"{path.resolve().name}, {split}"
-    return Material(name, truth, frames, chosen, problems=(*data.problems, *unreadable))
+    problems = (*data.problems, *unreadable)
+    return Material(name, truth, frames, chosen, problems=problems, is_whole=split == "all")
 
 
 def simulated_clip(folder: Path, limit: int | None = None) -> Material:

@@ -54,8 +54,10 @@ class ClassLoss:
 
     @property
     def allowed(self) -> float:
-        """Fall of AP that is allowed: 2 points, or with few truths what one of them may move."""
-        return MOST_CLASS_LOSS if self.counted else max(MOST_CLASS_LOSS, 1.0 / self.truths + _AP11_STEP)
+        """Fall of AP that is allowed: 2 points, or with few truths what one of them may move, but never half of it."""
+        if self.counted:
+            return MOST_CLASS_LOSS
+        return max(MOST_CLASS_LOSS, min(1.0 / self.truths + _AP11_STEP, self.before / 2.0))
 
 
 @dataclass(frozen=True, slots=True)

@@ -99,6 +99,17 @@ class RunFolder:
         """
         self._write_text("run.yaml", yaml.safe_dump(plain(configuration), sort_keys=False))
 
+    def replace_plan(self, configuration: dict[str, Any], step: int) -> None:
+        """Record what a run goes on with; what held until this step, if different, stays as `run-until-STEP.yaml`.
+
+        Raises:
+            OutputError: It cannot be written.
+        """
+        before = read_run(self.path)
+        if before != plain(configuration):
+            self._write_text(f"run-until-{step}.yaml", yaml.safe_dump(before, sort_keys=False))
+            self.write_plan(configuration)
+
     def read_start(self) -> dict[str, Any]:
         """Read the facts again.
 
@@ -121,7 +132,6 @@ class RunFolder:
         score: DetectionScore,
         network: DarknetNetwork,
         pictures: Sequence[LabelledPicture],
-        pictures_seen: int,
     ) -> None:
         """Write weights, table and curves after a validation; for the best one also predictions and scores.
 
@@ -130,9 +140,8 @@ class RunFolder:
             score: Its figures.
             network: The averaged network.
             pictures: Of the validation split; some are shown.
-            pictures_seen: In training so far; goes into the weights' header.
         """
-        header = WeightsHeader(seen=pictures_seen)
+        header = WeightsHeader(seen=progress.seen)
         save_weights(network, self.last_weights, header)
         write_json(self.path / "history.json", progress.rows)
         self._write_text("table.md", markdown_table(progress.rows, self.classes))
@@ -169,7 +178,7 @@ class RunFolder:
 
 
 def read_run(folder: Path) -> dict[str, Any]:
-    """Read what a run was started with.
+    """Read what a run was started, or last resumed, with.
 
     Raises:
         ConfigError: There is no run in the folder, or its record is damaged.

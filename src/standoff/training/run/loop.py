@@ -45,6 +45,7 @@ class Progress:
 
     Attributes:
         step: Steps done.
+        seen: Pictures shown.
         best_map: Best mean average precision so far, -1 before the first validation.
         best_step: Where it was.
         rows: One of the history for each validation: step, learning rate, mean losses since the last, figures.
@@ -52,6 +53,7 @@ class Progress:
     """
 
     step: int = 0
+    seen: int = 0
     best_map: float = -1.0
     best_step: int = 0
     rows: list[dict[str, Any]] = field(default_factory=list)
@@ -169,7 +171,7 @@ class Trainer:
             raise DataError(
                 expected="a finite loss",
                 found=f"{sums[0]} at step {step + 1}",
-                fix="lower learning_rate, or resume from the last checkpoint",
+                fix="go on from the last checkpoint with a lower rate: --resume --set learning_rate=...",
             )
         torch.nn.utils.clip_grad_norm_([p for p in self._network.parameters() if p.grad is not None], params.clip_norm)
         self._optimizer.step()
@@ -210,6 +212,7 @@ class Trainer:
 
     def _note(self, step: int, terms: list[float]) -> None:
         self.progress.step = step + 1
+        self.progress.seen += self._params.batch * self._params.accumulate * self._crew.size
         self.progress.losses = [
             before + value for before, value in zip(self.progress.losses, [*terms, 1.0], strict=True)
         ]

@@ -29,9 +29,9 @@ from standoff.training.run.params import TrainParams
 from standoff.training.start.starting_point import backbone_of, compose_cfg, fill_network
 
 _MAY_CHANGE: Final = frozenset(
-    {"accumulate", "batch", "checkpoint_every", "patience", "steps", "validate_every", "validate_pictures", "workers"}
+    {"accumulate", "batch", "checkpoint_every", "learning_rate", "patience", "steps", "validate_every", "workers"}
 )
-"""Settings of a run that is resumed; the others are in the state that its checkpoint holds, or would cut its curve."""
+"""Settings that a run may go on with otherwise; the rest is in the state of its checkpoint, or would cut its curve."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,18 +98,19 @@ def train_detector(plan: RunPlan, out: Path, listener: Listener, *, resumes: boo
     _require_usable(data, plan.params)
     folder = RunFolder(out, data.classes)
     if resumes:
-        network, backbone_layers = _resumed(folder, plan, leads=leads)
+        network, backbone_layers = _resumed(folder, plan)
     else:
         network, backbone_layers = _started(plan, data, folder, listener, leads=leads)
     trainer = Trainer(network, data, plan.params, folder.checkpoints, plan.params.backbone_layers or backbone_layers)
     if resumes:
         for name in trainer.resume():
             listener.on_message(f"{name} is damaged and was passed over: going on from step {trainer.progress.step}")
+        if leads:
+            folder.replace_plan(plan.to_dict(), trainer.progress.step)
     unreadable = _Unreadable(listener)
 
     def on_validation(progress: Progress, score: DetectionScore, shown: DarknetNetwork) -> None:
-        seen = progress.step * plan.params.batch * plan.params.accumulate * Crew.join().size
-        folder.write_validation(progress, score, shown, data.splits["val"], seen)
+        folder.write_validation(progress, score, shown, data.splits["val"])
         listener.on_row(progress.rows[-1])
 
     first, started_s = trainer.progress.step, monotonic()
@@ -197,7 +198,7 @@ def _started(
     return network, backbone_of(network, transferred)
 
 
-def _resumed(folder: RunFolder, plan: RunPlan, *, leads: bool) -> tuple[DarknetNetwork, int]:
+def _resumed(folder: RunFolder, plan: RunPlan) -> tuple[DarknetNetwork, int]:
     cfg = read_cfg(folder.cfg)
     facts = folder.read_start()
     classes = folder.read_classes()
@@ -215,8 +216,6 @@ def _resumed(folder: RunFolder, plan: RunPlan, *, leads: bool) -> tuple[DarknetN
                 found=f"{now[name]}",
                 fix=f"leave it as it was (only {', '.join(sorted(_MAY_CHANGE))} may change), or start a new run",
             )
-    if leads:
-        folder.write_plan(plan.to_dict())
     return DarknetNetwork(cfg), int(facts["backbone_layers"])
 
 

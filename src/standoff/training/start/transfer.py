@@ -16,7 +16,7 @@ import torch
 from torch import Tensor
 
 from standoff.core.errors import ModelError
-from standoff.training.darknet.cfg import Yolo, read_cfg
+from standoff.training.darknet.cfg import DarknetCfg, Yolo, read_cfg
 from standoff.training.darknet.network import ConvolutionBlock, DarknetNetwork
 from standoff.training.darknet.shapes import weights_numbers
 from standoff.training.darknet.weights import fill_convolutions, read_numbers
@@ -24,7 +24,7 @@ from standoff.training.start.anchors import overlap_of_sizes
 from standoff.training.start.class_rows import COCO_CLASSES, class_sources
 from standoff.training.start.efficientnet_weights import fill_efficientnet_lite0
 from standoff.training.start.initial_weights import head_convolutions, initialize_layers
-from standoff.training.start.weights_source import cfg_by_length, matching_layers, published_by_length
+from standoff.training.start.weights_source import cfg_by_length, matching_layers
 
 _TORCH_SUFFIXES: Final = (".pth", ".pt")
 
@@ -64,8 +64,8 @@ def transfer_weights(
         network: Changed in place.
         weights: Darknet weights, of all layers or cut after any of them; or a `.pth` or `.pt` file, see
             `fill_efficientnet_lite0`.
-        source_cfg: The cfg that they belong to. None: a known architecture with any number of classes, the network's
-            own cfg, or its first layers, whichever the length of the file fits first.
+        source_cfg: The cfg that they belong to. None: the network's own, a known architecture with another number
+            of classes or with COCO's, or the network's first layers, whichever the length of the file fits.
         classes: Names of the network's classes; without them no class starts from one of another name.
         source_classes: Names of the source's classes; they count only where they are as many as it has.
         generator: For layers that the source lacks; None: torch's own.
@@ -79,9 +79,10 @@ def transfer_weights(
     _, numbers = read_numbers(weights)
     source = read_cfg(source_cfg) if source_cfg is not None else None
     if source is None:
-        # Published weights have the anchors of their own cfg, also where the classes are as many as here.
-        fits = len(numbers) == weights_numbers(network.cfg)
-        source = (published_by_length if fits else cfg_by_length)(network.cfg, len(numbers))
+        source = cfg_by_length(network.cfg, len(numbers))
+        # What fits the network itself is its own, with its own anchors, unless it is what everybody publishes.
+        if len(numbers) == weights_numbers(network.cfg) and not _is_published_for_coco(source):
+            source = None
     if source is None:
         filled = fill_convolutions(network, numbers, weights.name, may_end_early=True)
         part = "all" if filled == len(network.convolutions()) else "the first"
@@ -101,6 +102,10 @@ def transfer_weights(
         fresh=tuple(index for index, _ in network.convolutions() if index not in matches),
         class_sources=tuple(tuple(names[number] for number in sources) for sources in rows) if resized else (),
     )
+
+
+def _is_published_for_coco(source: DarknetCfg | None) -> bool:
+    return source is not None and source.heads[0].classes == len(COCO_CLASSES)
 
 
 def _started(network: DarknetNetwork, source: str, filled: int, generator: torch.Generator | None) -> Transferred:

@@ -36,21 +36,13 @@ def cfg_by_length(cfg: DarknetCfg, numbers: int) -> DarknetCfg | None:
         The same network with another number of classes, or a known architecture most of whose layers it has; None if
         the length fits none of them.
     """
-    published = published_by_length(cfg, numbers)
-    if published is not None:
-        return published
-    classes = _classes_by_length(cfg, numbers)
-    return None if classes is None else _with_classes(cfg, classes)
-
-
-def published_by_length(cfg: DarknetCfg, numbers: int) -> DarknetCfg | None:
-    """Return the known architecture, most of whose layers the network has, that a weights file belongs to; or None."""
     for name, compose in _PUBLISHED.items():
         known = parse_cfg(compose(1), name)
         classes = _classes_by_length(known, numbers)
         if classes is not None and len(matching_layers(cfg, known)) > len(_kinds(known)) // 2:
             return parse_cfg(compose(classes), name)
-    return None
+    classes = _classes_by_length(cfg, numbers)
+    return None if classes is None else _with_classes(cfg, classes)
 
 
 def _classes_by_length(cfg: DarknetCfg, numbers: int) -> int | None:
