@@ -24,8 +24,8 @@ _ROOM_RIGHT: Final = 2.4
 """Factor of time right of the slowest, for its label."""
 _LEAST_TOP: Final = 0.05
 _BAR_COLOUR: Final = "#bbbbbb"
-_LABEL_SHARE, _LABEL_LOG_WIDTH = 0.045, 0.6
-"""Room for a label: share of the axis' height, and natural logarithm of the times that it spans."""
+_LABEL_SHARE, _LABEL_LOG_WIDTH = 0.045, 0.055
+"""Room for a label: share of the axis' height, and natural logarithm of the times that a letter spans."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +117,7 @@ def _draw_panel(axes: Axes, networks: Sequence[Family], times_ms: FloatArray, va
 def _write_labels(axes: Axes, networks: Sequence[Family], times_ms: FloatArray, values: FloatArray) -> None:
     """Write the name of each network beside its slowest point, and the sizes of the others below theirs."""
     height = _LABEL_SHARE * (axes.get_ylim()[1] - axes.get_ylim()[0])
-    placed: list[tuple[float, float]] = []
+    placed: list[tuple[float, float, int]] = []
     slowest = {max(network.rows, key=times_ms.item) for network in networks}
     of_row = {
         row: (number, size)
@@ -126,14 +126,16 @@ def _write_labels(axes: Axes, networks: Sequence[Family], times_ms: FloatArray, 
     }
     for row in np.argsort(values)[: np.isfinite(values).sum()].tolist():
         number, size = of_row[row]
-        level = float(values[row])
-        for other_ms, other in placed:
-            if abs(np.log(other_ms / times_ms[row])) < _LABEL_LOG_WIDTH and level < other + height:
-                level = other + height
-        placed.append((float(times_ms[row]), level))
-        text = f"{networks[number].name} {size}".strip() if row in slowest else size
+        level, text = float(values[row]), size
         # A line goes up to the right: below its points is room.
-        offset, font_size = ((8, 0), 8.0) if row in slowest else ((5, -8), 7.0)
+        offset, font_size = (5, -8), 7.0
+        if row in slowest:
+            text, offset, font_size = f"{networks[number].name} {size}".strip(), (8, 0), 8.0
+            for other_ms, other, letters in placed:
+                left, right = sorted([(float(times_ms[row]), len(text)), (other_ms, letters)])
+                if np.log(right[0] / left[0]) < _LABEL_LOG_WIDTH * left[1] and level < other + height:
+                    level = other + height
+            placed.append((float(times_ms[row]), level, len(text)))
         axes.annotate(
             text, (times_ms[row], level), xytext=offset, textcoords="offset points", va="center", fontsize=font_size,
             color=colour_of(number), zorder=1.5,
