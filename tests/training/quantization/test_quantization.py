@@ -123,7 +123,7 @@ def test_a_corrupt_picture_is_left_out_and_named(tmp_path: Path) -> None:
     cut_too = folder / "annotations" / "train_000.png"
     cut_too.write_bytes(cut_too.read_bytes()[:-2000])
     report, _ = _quantize(write_detector(tmp_path), to_site_classes(read_data(folder)))
-    assert report.unreadable == (cut,)
+    assert report.unreadable == (cut_too, cut)
     assert report.deciding_pictures == 29
 
 
