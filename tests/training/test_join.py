@@ -49,6 +49,19 @@ def test_rows_are_those_of_the_parts_without_the_classes_they_do_not_answer_for(
     np.testing.assert_array_equal(_rows(out, picture), np.concatenate(expected, axis=1))
 
 
+@pytest.mark.parametrize("listing", [0, 1])
+def test_operators_that_a_part_lists_and_does_not_use_are_no_obstacle(tmp_path: Path, listing: int) -> None:
+    models = write_models(tmp_path, 1, 2)
+    picture = np.random.default_rng(0).random((1, 3, 64, 96), dtype=np.float32)
+    expected = np.concatenate([_rows(model, picture) for model in models], axis=1)
+    # As onnxruntime's quantiser leaves its files.
+    proto = onnx.load(str(models[listing]))
+    proto.opset_import.append(onnx.helper.make_opsetid("com.microsoft.experimental", 1))
+    onnx.save(proto, str(models[listing]))
+    join_models([(model, {}) for model in models], tmp_path / "joined.onnx")
+    np.testing.assert_array_equal(_rows(tmp_path / "joined.onnx", picture), expected)
+
+
 def test_the_card_names_every_part(tmp_path: Path) -> None:
     models = write_models(tmp_path, 1, 2)
     card = join_models([(models[0], {}), (models[1], {"worker": 1.0})], tmp_path / "joined.onnx")

@@ -22,7 +22,7 @@ _BOX_MARGIN = 0.06
 
 def demo(
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the outputs.")] = Path("demo"),
-    model: Annotated[str, typer.Option(help="Detector: site (ours), or an ONNX file.")] = "site",
+    model: Annotated[str, typer.Option(help="Detector: site or site-int8 (ours), or an ONNX file.")] = "site",
     json_file: Annotated[
         Path | None, typer.Option("--json", help="Also write the comparison as JSON; - prints only that.")
     ] = None,

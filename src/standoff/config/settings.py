@@ -125,7 +125,7 @@ class Settings(BaseSettings):
 
     model: Annotated[
         ShippedModel | Path,
-        Field(description="The detector: site (comes with standoff), or an ONNX file (see `standoff export`)."),
+        Field(description="The detector: site or site-int8 (ours), or an ONNX file (see `standoff export`)."),
     ] = "site"
     start_s: Annotated[float, Field(ge=0, description="Begin here; s.")] = 0.0
     stop_s: Annotated[float | None, Field(gt=0, description="End here; s. Absent: the source's end.")] = None

@@ -95,7 +95,13 @@ def _check_alike(first: Path, other: Path, read: tuple[_Model, _Model]) -> None:
 
 
 def _operators(model: onnx.ModelProto) -> tuple[str, ...]:
-    return tuple(sorted(f"{entry.domain or 'onnx'} {entry.version}" for entry in model.opset_import))
+    return tuple(sorted(f"{entry.domain or 'onnx'} {entry.version}" for entry in _used_opsets(model)))
+
+
+def _used_opsets(model: onnx.ModelProto) -> list[onnx.OperatorSetIdProto]:
+    """Return the operator sets that a model uses; what quantised it lists others besides."""
+    used = {node.domain for node in model.graph.node}
+    return [entry for entry in model.opset_import if entry.domain in used]
 
 
 def _text(values: tuple[object, ...]) -> str:
@@ -143,4 +149,4 @@ def _joined(models: Sequence[onnx.ModelProto], factors: Sequence[_Floats]) -> on
     width = first.output[0].type.tensor_type.shape.dim[2].dim_value
     result = onnx.helper.make_tensor_value_info(OUTPUT_NAME, onnx.TensorProto.FLOAT, [1, rows, width])
     graph = onnx.helper.make_graph(nodes, "joined", list(first.input), [result], tensors)
-    return onnx.helper.make_model(graph, opset_imports=models[0].opset_import, ir_version=models[0].ir_version)
+    return onnx.helper.make_model(graph, opset_imports=_used_opsets(models[0]), ir_version=models[0].ir_version)
