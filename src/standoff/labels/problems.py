@@ -25,7 +25,7 @@ def problem_lines(problems: Sequence[Problem]) -> list[str]:
         kinds.setdefault(problem.kind, []).append(problem)
     lines = []
     for kind, own in kinds.items():
-        named = "; ".join(f"{problem.path}: {problem.found}" for problem in own[:_NAMED])
+        named = "; ".join(str(problem) for problem in own[:_NAMED])
         lines.append(f"{len(own)} times {kind}: {named}" + ("; ..." if len(own) > _NAMED else ""))
     return lines
 

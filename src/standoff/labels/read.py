@@ -193,7 +193,7 @@ def _require_enough(source: Source, good: int, problems: Sequence[Problem]) -> N
     if good >= skipped and good > 0:
         return
     examples = [next(problem for problem in problems if problem.kind == kind) for kind, _ in kinds.most_common(3)]
-    reasons = [f"{one.kind} ({kinds[one.kind]}, as {one.path}: {one.found})" for one in examples]
+    reasons = [f"{one.kind} ({kinds[one.kind]}, as {one})" for one in examples]
     raise DataError(
         expected=f"pictures with labels in '{source.name}', most of them usable",
         found=f"{good} usable and {skipped} not: {'; '.join(reasons)}" if reasons else "no picture",

@@ -59,6 +59,9 @@ class Problem:
     kind: str
     skipped_picture: bool
 
+    def __str__(self) -> str:
+        return f"{self.path}: {self.found}"
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LabelledData:

@@ -45,7 +45,7 @@ class Comparison:
             "data": self.material,
             "pictures": self.pictures,
             "groups": self.groups,
-            "problems": [f"{problem.path}: {problem.found}" for problem in self.problems],
+            "problems": [str(problem) for problem in self.problems],
             "machine": machine(),
             "difference_95_of_the_first_two": asdict(self.chance.difference)
             if self.chance and self.chance.difference

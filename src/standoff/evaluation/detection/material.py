@@ -70,8 +70,10 @@ def labelled_pictures(
     """
     data = to_site_classes(read_data(path))
     split = split or ("test" if data.is_divided else "all")
-    every = sorted(chain.from_iterable(data.splits.values()), key=lambda picture: picture.path)
-    pictures = every if split == "all" else data.splits[split]
+    if split == "all":
+        pictures = tuple(sorted(chain.from_iterable(data.splits.values()), key=lambda picture: picture.path))
+    else:
+        pictures = data.splits[split]
     if not pictures:
         counts = ", ".join(f"{len(some)} in {name}" for name, some in data.splits.items() if some)
         raise DataError(
@@ -84,7 +86,7 @@ def labelled_pictures(
     if not truth:
         raise DataError(
             expected=f"pictures in the split {split} of {path} that can be decoded",
-            found=f"none of {len(rows)}, the first {unreadable[0].path}: {unreadable[0].found}",
+            found=f"none of {len(rows)}, the first {unreadable[0]}",
             fix="restore the files",
         )
     left_out = {problem.path for problem in unreadable}

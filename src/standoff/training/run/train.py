@@ -135,7 +135,7 @@ class _Unreadable:
     def hear(self, problem: Problem) -> None:
         if problem.path not in self._paths:
             self._paths.add(problem.path)
-            self._listener.on_message(f"skipped {problem.path}: {problem.found}")
+            self._listener.on_message(f"skipped {problem}")
 
     def sum_up(self) -> None:
         if self._paths:
@@ -187,7 +187,7 @@ def _started(
         "weights_sha256": None if plan.weights is None else file_sha256(plan.weights),
         "transferred": asdict(transferred),
         "backbone_layers": backbone_of(network, transferred),
-        "problems": [f"{problem.path}: {problem.found}" for problem in data.problems],
+        "problems": [str(problem) for problem in data.problems],
     }
     if leads:
         layers = len(transferred.copied), len(transferred.resized), len(transferred.fresh)
