@@ -62,6 +62,13 @@ class Camera:
         to_new = np.linalg.inv(half_pixel) @ np.diag([scale_x, scale_y, 1.0]) @ half_pixel
         return Camera(width_px, height_px, to_new @ self.matrix, self.distortion)
 
+    def refocused(self, focal_factor: float, k1: float) -> Camera:
+        """Return the same camera with both focal lengths times a factor and another first radial coefficient."""
+        focal = np.diag([focal_factor, focal_factor, 1.0])
+        matrix = self.matrix @ focal
+        matrix[:2, 2] = self.matrix[:2, 2]
+        return Camera(self.width_px, self.height_px, matrix, np.array([k1, *self.distortion[1:]]))
+
     def _to_normalised(self, points_px: FloatArray) -> FloatArray:
         focal = np.array([self.matrix[0, 0], self.matrix[1, 1]])
         normalised: FloatArray = (np.asarray(points_px, dtype=np.float64).reshape(-1, 2) - self.matrix[:2, 2]) / focal
@@ -149,3 +156,45 @@ class Camera:
             found = self._unfolded(estimate) & (np.abs(distorted - wanted).max(axis=1, initial=0.0) < 1e-9)
         estimate[~found] = np.nan
         return self._to_pixels(estimate)
+
+
+DRONE_FIELD_DEG = 72.0
+"""Horizontal field of view of a drone's main camera when nothing is known: most have 65 to 80."""
+
+
+@dataclass(frozen=True, slots=True)
+class CameraPrior:
+    """What is known of a camera before its pictures have been looked at.
+
+    Attributes:
+        camera: The most likely camera.
+        focal_sigma: Standard error of the focal length, as a share of it.
+        k1_sigma: Standard error of the first radial distortion coefficient.
+        origin: Where this comes from, for people: "camera file", "EXIF", a drone's model, "a drone's usual lens".
+    """
+
+    camera: Camera
+    focal_sigma: float
+    k1_sigma: float
+    origin: str
+
+    @classmethod
+    def calibrated(cls, camera: Camera) -> CameraPrior:
+        """Return what a camera file says, taken to be good to a thousandth."""
+        return cls(camera, focal_sigma=1e-3, k1_sigma=2e-3, origin="camera file")
+
+    @classmethod
+    def unknown(cls, width_px: int, height_px: int) -> CameraPrior:
+        """Return what can be said of any drone's camera."""
+        focal_px = max(width_px, height_px) / 2.0 / np.tan(np.deg2rad(DRONE_FIELD_DEG / 2.0))
+        matrix = np.array([[focal_px, 0.0, (width_px - 1) / 2.0], [0.0, focal_px, (height_px - 1) / 2.0], [0.0, 0.0, 1.0]])
+        camera = Camera(width_px, height_px, matrix, np.zeros(5))
+        return cls(camera, focal_sigma=0.12, k1_sigma=0.06, origin="a drone's usual lens")
+
+    def scaled_to(self, width_px: int, height_px: int) -> CameraPrior:
+        """Return the same for pictures of another size and the same field of view.
+
+        Raises:
+            ValueError: The aspect ratio differs by more than one per cent.
+        """
+        return CameraPrior(self.camera.scaled_to(width_px, height_px), self.focal_sigma, self.k1_sigma, self.origin)
