@@ -2,6 +2,10 @@
 
 Site frame: x east, y north, z up, metres. Camera frame: x to the right of the picture, y down, z forward.
 Pixels follow the half-pixel convention of `standoff.core.camera`.
+
+A *change* of a view has eight parameters, `CHANGES`: a small turn about the camera's own axes (rad), a shift of its
+position in the site frame (m), the logarithm of a factor of the focal length, and an addition to the lens's k1.
+Covariances of views are of these.
 """
 
 from __future__ import annotations
@@ -13,6 +17,12 @@ import numpy as np
 
 from standoff.core.camera import Camera
 from standoff.core.homography import FloatArray
+
+CHANGES = 8
+"""Parameters of a change: turn (3), shift (3), log focal length, k1."""
+
+TURN, SHIFT, POSE, LENS = slice(0, 3), slice(3, 6), slice(0, 6), slice(6, 8)
+"""Their places in a change."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -113,3 +123,92 @@ class View:
         )
         homography: FloatArray = self.camera.matrix @ camera_from_plane
         return homography
+
+    def changed(self, change: FloatArray) -> View:
+        """Return the view after a change of eight parameters (see the module's head)."""
+        change = np.asarray(change, dtype=np.float64)
+        camera = self.camera
+        if change[LENS].any():
+            camera = camera.refocused(float(np.exp(change[6])), float(camera.distortion[0] + change[7]))
+        turned = rotation_from_vector(change[TURN]) @ self.site_to_camera
+        # Many small turns in a row must remain a rotation.
+        left, _, right = np.linalg.svd(turned)
+        return View(camera, self.position_m + change[SHIFT], left @ right)
+
+    def change_from(self, other: View) -> FloatArray:
+        """Return the change (8,) that leads from another view to this one."""
+        return np.concatenate(
+            [
+                vector_from_rotation(self.site_to_camera @ other.site_to_camera.T),
+                self.position_m - other.position_m,
+                [
+                    np.log(self.camera.matrix[0, 0] / other.camera.matrix[0, 0]),
+                    self.camera.distortion[0] - other.camera.distortion[0],
+                ],
+            ]
+        )
+
+    def project_with_jacobians(self, points_m: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Project points, and say how their pictures move with the view and with the points.
+
+        Args:
+            points_m: (N, 3), site frame.
+
+        Returns:
+            (N, 2) pixels as seen in the picture; (N, 2, 8) their derivative by a change of the view; (N, 2, 3) by the
+            points; NaN behind the camera.
+        """
+        points_m = np.asarray(points_m, dtype=np.float64).reshape(-1, 3)
+        in_camera = (points_m - self.position_m) @ self.site_to_camera.T
+        depth = np.where(in_camera[:, 2] > 0, in_camera[:, 2], np.nan)
+        normalised = in_camera[:, :2] / depth[:, None]
+        distorted, by_normalised = self.camera.distorted_with_jacobian(normalised)
+        focal = np.array([self.camera.matrix[0, 0], self.camera.matrix[1, 1]])
+        points_px = distorted * focal + self.camera.matrix[:2, 2]
+
+        by_camera_point = np.zeros((len(points_m), 2, 3))
+        by_camera_point[:, 0, 0] = by_camera_point[:, 1, 1] = 1.0 / depth
+        by_camera_point[:, :, 2] = -normalised / depth[:, None]
+        by_camera_point = focal[:, None] * (by_normalised @ by_camera_point)
+        by_point = by_camera_point @ self.site_to_camera
+        by_view = np.empty((len(points_m), 2, CHANGES))
+        # A turn w moves a point p of the camera frame by w x p.
+        x, y, z = in_camera.T
+        zero = np.zeros_like(x)
+        cross = np.stack([np.stack([zero, z, -y], -1), np.stack([-z, zero, x], -1), np.stack([y, -x, zero], -1)], 1)
+        by_view[:, :, TURN] = by_camera_point @ cross
+        by_view[:, :, SHIFT] = -by_point
+        by_view[:, :, 6] = distorted * focal
+        by_view[:, :, 7] = normalised * (normalised**2).sum(axis=1, keepdims=True) * focal
+        return points_px, by_view, by_point
+
+
+def rotation_from_vector(vector: FloatArray) -> FloatArray:
+    """Return the (3, 3) rotation by |vector| radians about a vector (Rodrigues).
+
+    >>> np.round(rotation_from_vector(np.array([0.0, 0.0, np.pi / 2])) @ [1.0, 0.0, 0.0], 9) + 0.0
+    array([0., 1., 0.])
+    """
+    angle = float(np.linalg.norm(vector))
+    x, y, z = vector
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    if angle < 1e-8:
+        return np.eye(3) + cross
+    rotation: FloatArray = (
+        np.eye(3) + np.sin(angle) / angle * cross + (1.0 - np.cos(angle)) / angle**2 * (cross @ cross)
+    )
+    return rotation
+
+
+def vector_from_rotation(rotation: FloatArray) -> FloatArray:
+    """Return the vector (3,) of `rotation_from_vector`, for turns of less than half a circle.
+
+    >>> np.round(vector_from_rotation(rotation_from_vector(np.array([0.1, -0.2, 0.3]))), 9)
+    array([ 0.1, -0.2,  0.3])
+    """
+    axis = np.array([rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1]])
+    sine, cosine = float(np.linalg.norm(axis)) / 2.0, (float(np.trace(rotation)) - 1.0) / 2.0
+    if sine < 1e-9:
+        return axis / 2.0
+    vector: FloatArray = axis / (2.0 * sine) * np.arctan2(sine, cosine)
+    return vector
