@@ -71,7 +71,12 @@ def open_run(source: Path | str, out: Path | str, settings: Settings, *, overwri
     """
     _refuse_own_source(Path(source).resolve(), Path(out).resolve())
     frames = open_source(
-        source, start_s=settings.start_s, stop_s=settings.stop_s, every=settings.every, fps=settings.fps
+        source,
+        start_s=settings.start_s,
+        stop_s=settings.stop_s,
+        every=settings.every,
+        fps=settings.fps,
+        telemetry=settings.telemetry,
     )
     pipeline = build_pipeline(settings, frames)
     if (check_size := getattr(pipeline.ground, "check_size", None)) is not None:
@@ -81,7 +86,7 @@ def open_run(source: Path | str, out: Path | str, settings: Settings, *, overwri
         "source": frames.description,
         "model": getattr(pipeline.detector, "description", None),
         "ground": getattr(pipeline.ground, "description", None),
-        "warnings": ground_warnings(pipeline.ground),
+        "warnings": [*frames.warnings, *ground_warnings(pipeline.ground)],
     }
     extra = {name: build_replacement(name, replacement) for name, replacement in settings.extra_outputs.items()}
     folder = prepare_output(out, overwrite=overwrite)

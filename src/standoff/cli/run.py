@@ -73,6 +73,9 @@ def run(
         str | None, typer.Option(help="Box of the reference in the first frame: left,top,right,bottom px.")
     ] = None,
     camera: Annotated[Path | None, typer.Option(help="Camera file: removes lens distortion.")] = None,
+    telemetry: Annotated[
+        str | None, typer.Option(help="The drone's log (.srt), or none. Default: the log beside the film.")
+    ] = None,
     start: Annotated[float | None, typer.Option(help="Begin here; s.")] = None,
     stop: Annotated[float | None, typer.Option(help="End here; s.")] = None,
     every: Annotated[int | None, typer.Option(help="Read every k-th frame only.")] = None,
@@ -93,6 +96,7 @@ def run(
 
     plain = {
         "model": model,
+        "telemetry": telemetry,
         "start_s": start,
         "stop_s": stop,
         "every": every,
@@ -104,7 +108,7 @@ def run(
     if ground_overrides := _ground_overrides(ground, reference_box, camera):
         overrides["ground"] = ground_overrides
     opened = open_run(source, out, load_settings(config, overrides), overwrite=overwrite)
-    for warning in ground_warnings(opened.pipeline.ground):
+    for warning in (*opened.source.warnings, *ground_warnings(opened.pipeline.ground)):
         typer.echo(f"standoff: warning: {warning}", err=True)
     try:
         watch(opened, quiet=quiet)

@@ -131,6 +131,12 @@ class Settings(BaseSettings):
     stop_s: Annotated[float | None, Field(gt=0, description="End here; s. Absent: the source's end.")] = None
     every: Annotated[int, Field(ge=1, description="Read every k-th frame only.")] = 1
     fps: Annotated[float | None, Field(gt=0, description="Frames a second of an image folder.")] = None
+    telemetry: Annotated[
+        Literal["none"] | Path | None,
+        Field(
+            description="The drone's log (.srt), or none. Absent: the log beside the film, or the pictures' EXIF data."
+        ),
+    ] = None
     detect_every: Annotated[int, Field(ge=1, description="Detect on every k-th frame read; tracks coast between.")] = 1
     detect: Annotated[DetectParams, Field(description="The detector.")] = DetectParams()
     ground: Annotated[GroundSettings, Field(description="The ground map.")] = GroundSettings()

@@ -18,6 +18,7 @@ from standoff.core import homography
 from standoff.core.camera import Camera
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.rows import Columns, Rows
+from standoff.core.telemetry import Telemetry
 
 IntArray = npt.NDArray[np.int64]
 ImageArray = npt.NDArray[np.uint8]
@@ -60,6 +61,7 @@ class Frame:
         time_s: Presentation timestamp, seconds from the start of the source.
         captured_at: Aware UTC time of capture, or None when the source does not tell.
         picture: The pixels.
+        telemetry: What the drone said of itself at that moment; None: nothing.
     """
 
     stream_id: str
@@ -67,6 +69,7 @@ class Frame:
     time_s: float
     picture: Picture
     captured_at: datetime | None = None
+    telemetry: Telemetry | None = None
 
     @property
     def image(self) -> ImageArray:

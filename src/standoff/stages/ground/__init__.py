@@ -8,6 +8,7 @@ from standoff.stages.ground.reference import ReferenceGround
 from standoff.stages.ground.shape import ReferenceShape
 from standoff.stages.ground.survey_file import load_survey
 from standoff.stages.ground.surveyed import SurveyedGround
+from standoff.stages.ground.telemetry_pose import TelemetryPose, view_from_telemetry
 from standoff.stages.ground.unmapped import Unmapped
 
 __all__ = [
@@ -17,6 +18,7 @@ __all__ = [
     "ReferenceParams",
     "ReferenceShape",
     "SurveyedGround",
+    "TelemetryPose",
     "Unmapped",
     "calibrate",
     "calibrate_views",
@@ -25,4 +27,5 @@ __all__ = [
     "load_survey",
     "read_boards",
     "save_camera",
+    "view_from_telemetry",
 ]
