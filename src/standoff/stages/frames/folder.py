@@ -13,6 +13,7 @@ from typing import Any
 import av
 
 from standoff.core.errors import SourceError
+from standoff.stages.frames.fingerprint import fingerprint
 from standoff.stages.frames.pictures import AvPicture, Scaler
 from standoff.stages.frames.reader import TIME_ROUNDING_S, Shot, check_size
 
@@ -125,6 +126,7 @@ class FolderReader:
             "size_px": list(self.size_px),
             "fps": self.rate_fps,
             "duration_s": len(self._paths) / self.rate_fps,
+            "fingerprint": fingerprint(self._paths),
             "frames_declared": len(self._paths),
             "clock": "given frame rate",
         }
