@@ -17,18 +17,19 @@ from cli.test_cli import make_video
 
 from standoff.config import load_settings
 from standoff.core.types import Detections, Frame
+from standoff.monitor import open_run
 
 FRAMES = 36
 NOTHING_SEEN = (16, 17, 18)
 """Frames in which the detector finds nothing at all."""
 
 TABLES = ("tracks", "proximity", "frames", "detections")
-SELECTIONS: dict[str, tuple[object, ...]] = {
-    "all": (),
-    "every": ("--every", 2),
-    "detect_every": ("--detect-every", 3),
-    "part": ("--start", 0.55, "--stop", 3.2),
-    "everything": ("--every", 2, "--detect-every", 2, "--start", 0.3, "--stop", 3.5),
+SELECTIONS: dict[str, dict[str, float]] = {
+    "all": {},
+    "every": {"every": 2},
+    "detect_every": {"detect_every": 3},
+    "part": {"start_s": 0.55, "stop_s": 3.2},
+    "everything": {"every": 2, "detect_every": 2, "start_s": 0.3, "stop_s": 3.5},
 }
 
 
@@ -72,10 +73,10 @@ def with_detector(site: Path, name: str) -> Path:
     return path
 
 
-def monitor(call: Call, film: Path, config: Path, out: Path, *words: object) -> Path:
-    outputs = ",".join((*TABLES, "hazards"))
-    code, _, error = call("run", film, "--config", config, "--out", out, "--outputs", outputs, "--quiet", *words)
-    assert (code, error) == (0, "")
+def monitor(film: Path, config: Path, out: Path, **more: object) -> Path:
+    settings = load_settings(config, {"outputs": [*TABLES, "hazards"], **more})
+    for _ in open_run(film, out, settings):
+        pass
     return out
 
 
@@ -106,23 +107,22 @@ def assert_same(out: Path, expected: Path) -> None:
 
 @pytest.mark.parametrize("selection", SELECTIONS.values(), ids=SELECTIONS.keys())
 def test_a_run_replayed_from_its_own_detections_is_the_same_run(
-    call: Call, film: Path, recording: Path, tmp_path: Path, selection: tuple[object, ...]
+    film: Path, recording: Path, tmp_path: Path, selection: dict[str, float]
 ) -> None:
-    original = monitor(call, film, recording, tmp_path / "original", *selection)
+    original = monitor(film, recording, tmp_path / "original", **selection)
     # How often the detector rested is known from the recording.
-    rested = selection.index("--detect-every") if "--detect-every" in selection else len(selection)
-    again = (*selection[:rested], *selection[rested + 2 :])
+    again = {name: value for name, value in selection.items() if name != "detect_every"}
     forbidden = with_detector(recording, "Forbidden")
-    replay = monitor(call, film, forbidden, tmp_path / "replay", *again, "--detections", original)
+    replay = monitor(film, forbidden, tmp_path / "replay", detections=str(original), **again)
     assert_same(replay, original)
     assert any(not row["observed"] for row in contents(replay)["tracks"])
     assert len(contents(replay)["hazards"]) > 1
 
 
 def test_every_frame_is_in_the_table_and_says_whether_the_detector_ran(
-    call: Call, film: Path, recording: Path, tmp_path: Path
+    film: Path, recording: Path, tmp_path: Path
 ) -> None:
-    said = contents(monitor(call, film, recording, tmp_path / "run", "--detect-every", 2))
+    said = contents(monitor(film, recording, tmp_path / "run", detect_every=2))
     of_frame: dict[int, list[dict[str, Any]]] = {}
     for row in said["detections"]:
         of_frame.setdefault(row["frame"], []).append(row)
@@ -135,21 +135,22 @@ def test_every_frame_is_in_the_table_and_says_whether_the_detector_ran(
 
 
 def test_a_part_of_a_recording_can_be_replayed_with_fewer_detections(
-    call: Call, film: Path, recording: Path, tmp_path: Path
+    film: Path, recording: Path, tmp_path: Path
 ) -> None:
-    whole = monitor(call, film, recording, tmp_path / "whole")
+    table = monitor(film, recording, tmp_path / "whole") / "detections.parquet"
     selection = SELECTIONS["everything"]
-    expected = monitor(call, film, recording, tmp_path / "detected", *selection)
-    words = ("--detections", whole / "detections.parquet", *selection)
-    assert_same(monitor(call, film, recording, tmp_path / "replay", *words), expected)
+    expected = monitor(film, recording, tmp_path / "detected", **selection)
+    assert_same(monitor(film, recording, tmp_path / "replay", detections=str(table), **selection), expected)
 
 
 def test_a_replay_can_be_replayed_and_knows_the_true_detector(
     call: Call, film: Path, recording: Path, tmp_path: Path
 ) -> None:
-    original = monitor(call, film, recording, tmp_path / "original")
-    once = monitor(call, film, recording, tmp_path / "once", "--detections", original)
-    twice = monitor(call, film, recording, tmp_path / "twice", "--detections", once)
+    original = monitor(film, recording, tmp_path / "original")
+    once, twice = tmp_path / "once", tmp_path / "twice"
+    for replayed, out in ((original, once), (once, twice)):
+        words = ("run", film, "--config", recording, "--out", out, "--detections", replayed)
+        assert call(*words, "--outputs", "tracks,proximity,frames,detections,hazards", "--quiet") == (0, "", "")
     assert_same(twice, original)
     model = json.loads((twice / "run.json").read_text())["model"]
     assert model["kind"] == "recorded"
@@ -160,7 +161,7 @@ def test_a_replay_can_be_replayed_and_knows_the_true_detector(
 def test_frames_that_were_not_recorded_end_the_replay_in_one_line(
     call: Call, film: Path, recording: Path, tmp_path: Path
 ) -> None:
-    short = monitor(call, film, recording, tmp_path / "short", "--every", 2, "--stop", 0.4)
+    short = monitor(film, recording, tmp_path / "short", every=2, stop_s=0.4)
     code, _, error = call(
         "run", film, "--config", recording, "--out", tmp_path / "replay", "--detections", short, "--quiet"
     )
@@ -185,7 +186,7 @@ def test_frames_that_were_not_recorded_end_the_replay_in_one_line(
 def test_what_cannot_be_replayed_is_one_line_exit_2_and_no_folder(
     call: Call, film: Path, recording: Path, tmp_path: Path, case: str, said: str
 ) -> None:
-    run = monitor(call, film, recording, tmp_path / "run", "--stop", 0.4)
+    run = monitor(film, recording, tmp_path / "run", stop_s=0.4)
     table = run / "detections.parquet"
     replayed, source, out, more = run, film, tmp_path / "replay", list[object]()
     match case:
