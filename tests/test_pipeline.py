@@ -103,6 +103,22 @@ def test_tracks_coast_and_say_so_while_the_detector_rests() -> None:
         assert (result.tracks.observed == result.detected).all()
 
 
+class Weary(TwoWalkers):
+    """A detector that rests on every other frame, of its own accord."""
+
+    def rests(self, frame: Frame) -> bool:
+        return frame.index % 2 == 1
+
+
+def test_tracks_coast_where_the_detector_itself_rests() -> None:
+    monitored = pipeline(frames(9))
+    monitored.detector = Weary()
+    results = list(monitored.run())
+    assert [result.detected for result in results] == [frame % 2 == 0 for frame in range(9)]
+    assert monitored.detector.calls == 5
+    assert not any(result.tracks.observed.any() for result in results[1::2])
+
+
 def test_without_a_map_every_pair_is_there_and_none_is_measured() -> None:
     results = list(pipeline(frames(10), mapped=False).run())
     assert len(results[-1].proximities) == 1

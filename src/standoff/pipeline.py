@@ -8,7 +8,15 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from time import perf_counter
 
-from standoff.core.protocols import Detector, Ground, HazardMonitor, Locator, ProximityMeter, Tracker
+from standoff.core.protocols import (
+    Detector,
+    Ground,
+    HazardMonitor,
+    Locator,
+    ProximityMeter,
+    RestingDetector,
+    Tracker,
+)
 from standoff.core.types import Detections, Frame, FrameResult, Hazard, Outcome, Sink
 
 _LOG = logging.getLogger(__name__)
@@ -27,7 +35,7 @@ class Pipeline:
 
     Attributes:
         frames: The source.
-        detector: Runs on every `detect_every`-th frame; tracks coast in between.
+        detector: Runs on every `detect_every`-th frame, unless it rests there; tracks coast in between.
         ground: Reads every frame.
         sinks: By name. One that fails is logged and left out from then on; the others go on.
         sink_errors: Message of each sink that failed.
@@ -76,6 +84,8 @@ class Pipeline:
     def step(self, frame: Frame, stage_ms: dict[str, float], *, detect: bool = True) -> FrameResult:
         """Take one frame through all stages; add each stage's milliseconds to `stage_ms`."""
         detections = Detections.empty()
+        if detect and isinstance(self.detector, RestingDetector):
+            detect = not self.detector.rests(frame)
         if detect:
             with _clocked(stage_ms, "detect"):
                 detections = self.detector.detect(frame)

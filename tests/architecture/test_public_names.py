@@ -11,8 +11,11 @@ import pytest
 PUBLIC_NAMES = {
     "standoff.stages.frames": {"ArrayPicture", "AvPicture", "Scaler", "Source", "frame_from_array", "open_source"},
     "standoff.stages.detect": {
-        "DEFAULT_CLASS_MAP", "SHIPPED_MODELS", "DetectParams", "OnnxDetector", "ShippedModel", "available_providers",
-        "find_model",
+        "DEFAULT_CLASS_MAP", "SHIPPED_MODELS", "DetectParams", "OnnxDetector", "RecordedDetector", "ShippedModel",
+        "available_providers", "find_model",
+    },
+    "standoff.clips": {
+        "COLUMNS", "DETECTIONS_FILE", "RecordedDetections", "is_recording", "metadata_of", "read_detections",
     },
     "standoff.stages.track": {"TrackParams", "Tracker"},
     "standoff.stages.locate": {"LocateParams", "Locator"},

@@ -20,7 +20,10 @@ from cli.calling import Call
 from standoff.core.errors import GroundError
 from standoff.core.types import Detections, Frame, NoGroundMap
 
-OUTPUTS = {"run.json", "tracks.parquet", "proximity.parquet", "frames.parquet", "hazards.jsonl", "annotated.mp4"}
+OUTPUTS = {
+    "run.json", "tracks.parquet", "proximity.parquet", "frames.parquet", "detections.parquet", "hazards.jsonl",
+    "annotated.mp4",
+}  # fmt: skip
 
 
 class Approach:

@@ -60,11 +60,30 @@ def _ground_overrides(ground: str | None, box: str | None, camera: Path | None) 
     return overrides
 
 
+def detector_overrides(model: str | None, detections: Path | None) -> dict[str, Any]:
+    """Translate `--model` and `--detections` into settings; either wins over what a settings file says of both.
+
+    Raises:
+        ConfigError: Both are given.
+    """
+    if model is not None and detections is not None:
+        raise ConfigError(
+            expected="--model or --detections", found="both", fix="leave one out: a replay runs no detector"
+        )
+    if detections is not None:
+        return {"detections": str(detections)}
+    return {} if model is None else {"model": model, "detections": None}
+
+
 def run(
     source: Annotated[Path, typer.Argument(help="Video file, or a folder of pictures.", show_default=False)],
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the outputs.", show_default=False)],
     config: Annotated[Path | None, typer.Option(help="Settings, YAML (see `standoff config show`).")] = None,
     model: Annotated[str | None, typer.Option(help="Detector: site (ours, the default), or an ONNX file.")] = None,
+    detections: Annotated[
+        Path | None,
+        typer.Option(help="Replay the detections of an earlier run of this source: its folder, or its table."),
+    ] = None,
     ground: Annotated[
         str | None,
         typer.Option(help="survey.yaml (surveyed points), square:SIDE (a square reference, side in m), or none."),
@@ -82,7 +101,8 @@ def run(
     fps: Annotated[float | None, typer.Option(help="Frames a second of a picture folder.")] = None,
     detect_every: Annotated[int | None, typer.Option(help="Detect on every k-th frame; tracks coast between.")] = None,
     outputs: Annotated[
-        str | None, typer.Option(help="What to write, with commas: tracks,proximity,frames,hazards,video,report.")
+        str | None,
+        typer.Option(help="What to write, with commas: tracks,proximity,frames,detections,hazards,video,report."),
     ] = None,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace an earlier run's files in the folder.")
@@ -95,7 +115,6 @@ def run(
     from standoff.monitor import RECORD, ground_warnings, open_run
 
     plain = {
-        "model": model,
         "telemetry": telemetry,
         "start_s": start,
         "stop_s": stop,
@@ -105,6 +124,7 @@ def run(
         "outputs": tuple(filter(None, map(str.strip, outputs.split(",")))) if outputs is not None else None,
     }
     overrides: dict[str, Any] = {name: value for name, value in plain.items() if value is not None}
+    overrides |= detector_overrides(model, detections)
     if ground_overrides := _ground_overrides(ground, reference_box, camera):
         overrides["ground"] = ground_overrides
     opened = open_run(source, out, load_settings(config, overrides), overwrite=overwrite)

@@ -12,7 +12,7 @@ from standoff.core.errors import ConfigError
 from standoff.core.protocols import Detector, Ground
 from standoff.core.types import Frame
 from standoff.pipeline import Pipeline
-from standoff.stages.detect import OnnxDetector, find_model
+from standoff.stages.detect import OnnxDetector, RecordedDetector, find_model
 from standoff.stages.ground import ReferenceGround, Unmapped, load_camera, load_survey
 from standoff.stages.hazard import HazardMonitor
 from standoff.stages.locate import Locator
@@ -56,11 +56,14 @@ def build_replacement(name: str, replacement: Replacement) -> Any:  # noqa: ANN4
 
 
 def build_detector(settings: Settings) -> Detector:
-    """Load the configured model.
+    """Load the configured model, or the detections of an earlier run.
 
     Raises:
-        ModelError: It cannot be used.
+        ModelError: The model cannot be used.
+        DataError: The detections cannot.
     """
+    if settings.detections is not None:
+        return RecordedDetector(settings.detections)
     return OnnxDetector(find_model(settings.model), settings.detect)
 
 
@@ -102,7 +105,8 @@ def build_stage(name: StageName, settings: Settings) -> Any:  # noqa: ANN401
     Raises:
         StandoffError: Something that the settings name cannot be used.
     """
-    if name in settings.replace:
+    is_replayed = name == "detect" and settings.detections is not None
+    if name in settings.replace and not is_replayed:
         return build_replacement(name, settings.replace[name])
     return _MAKERS[name](settings)
 

@@ -65,7 +65,13 @@ def read_settings_file(path: Path) -> dict[str, Any]:
 def _anchor_paths(settings: dict[str, Any], folder: Path) -> None:
     """Make paths absolute: those of a file are relative to it, not to wherever the program was started."""
     ground = settings.get("ground")
-    places = ((settings, "model"), (settings, "telemetry"), (ground, "survey"), (ground, "camera"))
+    places = (
+        (settings, "model"),
+        (settings, "detections"),
+        (settings, "telemetry"),
+        (ground, "survey"),
+        (ground, "camera"),
+    )
     for section, name in places:
         named = section is settings and settings.get(name) in (*SHIPPED_MODELS, "none")
         if isinstance(section, dict) and isinstance(section.get(name), str) and not named:

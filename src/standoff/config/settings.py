@@ -22,8 +22,8 @@ from standoff.stages.track import TrackParams
 Point = tuple[float, float]
 StageName = Literal["detect", "ground", "track", "locate", "proximity", "hazard"]
 STAGE_NAMES: tuple[StageName, ...] = ("detect", "ground", "track", "locate", "proximity", "hazard")
-OutputName = Literal["tracks", "proximity", "frames", "hazards", "video", "report"]
-OUTPUT_NAMES: tuple[OutputName, ...] = ("tracks", "proximity", "frames", "hazards", "video", "report")
+OutputName = Literal["tracks", "proximity", "frames", "detections", "hazards", "video", "report"]
+OUTPUT_NAMES: tuple[OutputName, ...] = ("tracks", "proximity", "frames", "detections", "hazards", "video", "report")
 
 
 class _Section(BaseModel):
@@ -127,6 +127,13 @@ class Settings(BaseSettings):
         ShippedModel | Path,
         Field(description="The detector: site or site-int8 (ours), or an ONNX file (see `standoff export`)."),
     ] = "site"
+    detections: Annotated[
+        Path | None,
+        Field(
+            description="An earlier run of the same source (its folder, or its detections.parquet) whose detections "
+            "are replayed; model, detect and a detect stage of your own then have no effect."
+        ),
+    ] = None
     start_s: Annotated[float, Field(ge=0, description="Begin here; s.")] = 0.0
     stop_s: Annotated[float | None, Field(gt=0, description="End here; s. Absent: the source's end.")] = None
     every: Annotated[int, Field(ge=1, description="Read every k-th frame only.")] = 1

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from standoff.core.types import (
     Detections,
@@ -23,6 +23,15 @@ class Detector(Protocol):
 
     def detect(self, frame: Frame) -> Detections:
         """Return what is seen, in full-size picture pixels and the site's classes."""
+        ...
+
+
+@runtime_checkable
+class RestingDetector(Detector, Protocol):
+    """A detector that has nothing to say of some frames, which is not the same as seeing nothing there."""
+
+    def rests(self, frame: Frame) -> bool:
+        """Tell whether tracks must coast at this frame, whatever `detect_every` is."""
         ...
 
 

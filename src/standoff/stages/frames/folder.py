@@ -15,6 +15,7 @@ import av
 from standoff.core.errors import SourceError
 from standoff.stages.frames.album import read_album
 from standoff.stages.frames.photograph import read_photograph
+from standoff.stages.frames.fingerprint import fingerprint
 from standoff.stages.frames.pictures import AvPicture, Scaler
 from standoff.stages.frames.reader import TIME_ROUNDING_S, Shot, check_size
 
@@ -133,6 +134,7 @@ class FolderReader:
             "size_px": list(self.size_px),
             "fps": self.rate_fps,
             "duration_s": len(self._paths) / self.rate_fps,
+            "fingerprint": fingerprint(self._paths),
             "frames_declared": len(self._paths),
             "clock": "given frame rate",
         }

@@ -14,6 +14,7 @@ import av
 from standoff.core.camera import CameraPrior
 from standoff.core.errors import SourceError, SourceTruncated
 from standoff.stages.frames.container import Header, not_a_video, open_video
+from standoff.stages.frames.fingerprint import fingerprint
 from standoff.stages.frames.pictures import AvPicture, Scaler
 from standoff.stages.frames.prior import drone_prior, find_drone
 from standoff.stages.frames.reader import TIME_ROUNDING_S, Shot, check_size
@@ -237,6 +238,7 @@ class VideoReader:
             "rotation_deg": self.rotation_deg,
             "fps": self.rate_fps,
             "duration_s": self._header.duration_s,
+            "fingerprint": fingerprint([self._path]),
             "frames_declared": self._header.declared_frames or None,
             "corrupt_frames": self.corrupt_frames,
             "clock": "presentation timestamps" if self._fps is None else "given frame rate",
