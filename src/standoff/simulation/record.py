@@ -161,6 +161,8 @@ def _describe_reference(reference: Reference) -> dict[str, Any]:
         "entity_id": reference.entity_id,
         "top_m": reference.top_m.tolist(),
         "base_m": reference.base_m.tolist(),
+        "ground_m": reference.ground_m,
+        "height_m": reference.height_m,
         "covers": [{"start_s": cover.start_s, "stop_s": cover.stop_s} for cover in reference.covers],
     }
 
@@ -172,7 +174,8 @@ def _save_reference(reference: Reference | None, view: View, path: Path) -> None
         first_px = view.project(reference.top_m[:1])[0]
         size_px = (view.camera.width_px, view.camera.height_px)
         hint = {"first_corner_px": first_px.tolist()} if ((first_px >= 0) & (first_px < size_px)).all() else {}
-        ground["reference"] = {"corners_m": reference.top_m[:, :2].tolist(), **hint}
+        shape = {"corners_m": reference.top_m[:, :2].tolist(), "height_m": reference.height_m}
+        ground["reference"] = {**shape, **hint}
     path.write_text(yaml.safe_dump({"ground": ground}, sort_keys=False))
 
 
