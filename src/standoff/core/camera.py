@@ -97,7 +97,7 @@ class Camera:
         jacobian[:, 1, 1] = radial + 2.0 * y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x
         return distorted, jacobian
 
-    def _unfolded(self, normalised: FloatArray) -> BoolArray:
+    def _unfolded(self, normalised: FloatArray, jacobian: FloatArray) -> BoolArray:
         """Return (N,) whether the lens polynomial still grows from the centre outwards up to each point.
 
         Beyond its first fold the polynomial shows directions a second time that no lens puts there.
@@ -106,7 +106,6 @@ class Camera:
         slope_roots = np.roots([7.0 * k3, 5.0 * k2, 3.0 * k1, 1.0])
         folds_r2 = slope_roots.real[(slope_roots.real > 0) & (np.abs(slope_roots.imag) < 1e-12)]
         with np.errstate(invalid="ignore", over="ignore"):
-            _, jacobian = self._distorted(normalised)
             determinant = jacobian[:, 0, 0] * jacobian[:, 1, 1] - jacobian[:, 0, 1] * jacobian[:, 1, 0]
             grows = (determinant > 0) & (jacobian[:, 0, 0] + jacobian[:, 1, 1] > 0)
             unfolded: BoolArray = grows & ((normalised**2).sum(axis=1) < folds_r2.min(initial=np.inf))
@@ -123,8 +122,8 @@ class Camera:
         """
         normalised = self._to_normalised(points_px)
         with np.errstate(invalid="ignore", over="ignore"):
-            distorted, _ = self._distorted(normalised)
-        distorted[~self._unfolded(normalised)] = np.nan
+            distorted, jacobian = self._distorted(normalised)
+        distorted[~self._unfolded(normalised, jacobian)] = np.nan
         return self._to_pixels(distorted)
 
     def undistort(self, points_px: FloatArray) -> FloatArray:
@@ -152,8 +151,8 @@ class Camera:
                         (jacobian[:, 0, 0] * error[:, 1] - jacobian[:, 1, 0] * error[:, 0]) / determinant,
                     ]
                 )
-            distorted, _ = self._distorted(estimate)
-            found = self._unfolded(estimate) & (np.abs(distorted - wanted).max(axis=1, initial=0.0) < 1e-9)
+            distorted, jacobian = self._distorted(estimate)
+            found = self._unfolded(estimate, jacobian) & (np.abs(distorted - wanted).max(axis=1, initial=0.0) < 1e-9)
         estimate[~found] = np.nan
         return self._to_pixels(estimate)
 

@@ -137,6 +137,9 @@ def describe_scene(plan: Plan, site: Site) -> dict[str, Any]:
         "preset": plan.name,
         **{name: value for name, value in asdict(plan.preset).items() if name not in ("summary", "covers")},
         "variable_rate": plan.variable_rate,
+        "stature_m": plan.stature_m,
+        "stooping": plan.stooping,
+        "camera": plan.camera,
         "entities": [_describe_actor(actor) for actor in scene.actors],
         "reference": None if scene.reference is None else _describe_reference(scene.reference),
         "board": None

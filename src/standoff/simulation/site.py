@@ -10,7 +10,7 @@ import shapely
 
 from standoff.core.camera import Camera
 from standoff.core.homography import FloatArray
-from standoff.simulation.casting import CASTS, Cast, Stage
+from standoff.simulation.casting import CASTS, Cast, Stage, bend_over
 from standoff.simulation.covers import make_cover
 from standoff.simulation.flight import drone_camera, make_flight
 from standoff.simulation.layout import lay_out
@@ -87,7 +87,7 @@ def build_site(plan: Plan) -> Site:
     """
     preset = plan.preset
     # a stream for each part: a change of one leaves the others as they were
-    names = ("cast", "ground", "reference", "props", "surroundings", "light", "camera", "flight", "look", "crane")
+    names = ("cast", "ground", "reference", "props", "surroundings", "light", "camera", "flight", "look", "crane", "people")
     streams = np.random.SeedSequence(plan.seed).spawn(len(names))
     rng = {name: np.random.default_rng(stream) for name, stream in zip(names, streams, strict=True)}
 
@@ -96,8 +96,9 @@ def build_site(plan: Plan) -> Site:
     duration_s = plan.duration_s * 1.3 + 1.0  # a variable rate takes longer than the nominal one
     scale = max(1.0, preset.altitude_m / 25.0)
     reference_m = None if preset.shape is None else preset.reference_offset_m
-    stage = Stage(heading_deg, scale, duration_s, plan.excavator_mesh, reference_m)
+    stage = Stage(heading_deg, scale, duration_s, plan.excavator_mesh, reference_m, plan.stature_m)
     cast = CASTS[preset.cast](rng["cast"], stage)
+    bend_over(rng["people"], cast, plan.stooping)
     flight = make_flight(
         rng["flight"], preset.motion, camera, target_xy_m=np.zeros(2), altitude_m=preset.altitude_m,
         pitch_deg=preset.pitch_deg, heading_deg=heading_deg, duration_s=plan.duration_s,
