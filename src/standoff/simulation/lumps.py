@@ -7,6 +7,7 @@ camera are in front.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Self
@@ -98,10 +99,9 @@ def cut(mesh: Mesh, wires: bool = True) -> Lumps:
 
 
 def _hull(points_m: npt.NDArray[np.float64]) -> Lumps:
-    try:
+    # what is flat has no hull in space, and its own corners will do
+    with suppress(QhullError):
         points_m = points_m[ConvexHull(points_m).vertices]
-    except QhullError:  # flat: its own corners will do
-        pass
     return Lumps(points_m.astype(np.float32), np.zeros(1, np.int64))
 
 

@@ -175,7 +175,7 @@ class Outlines:
         sizes = [len(thing.lumps.points_m) for thing in things]
         ground_m = np.repeat([thing.ground_m for thing in things], sizes)
         under = lumps.points_m[:, 2] < ground_m
-        full_px = view.project(lumps.points_m)
+        full_px = view.project(lumps.points_m.astype(np.float64))
         above_px = full_px.copy()
         above_px[under] = view.project(np.column_stack([lumps.points_m[under, :2], ground_m[under]]))
         away_m = np.linalg.norm(lumps.points_m - view.position_m, axis=1)
