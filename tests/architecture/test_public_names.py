@@ -25,7 +25,7 @@ PUBLIC_NAMES = {
     "standoff.simulation.behaviour": {
         "carrying_between", "crossing_behind", "digging", "dozing", "driving_through", "grading", "idle",
         "keep_distance", "loader_loading", "near_miss", "pair_talking", "random_stance", "rolling", "spreading",
-        "standing_working", "truck_loading", "walking_past",
+        "standing_working", "stooping", "truck_loading", "walking_past",
     },
 }  # fmt: skip
 

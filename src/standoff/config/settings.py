@@ -46,6 +46,10 @@ class ReferenceSettings(_Section):
         tuple[Point, Point, Point, Point] | None,
         Field(description="Four corners, counter-clockwise seen from above, in the site frame; m."),
     ] = None
+    height_m: Annotated[
+        float | None,
+        Field(ge=0, description="Height of its top above the ground; m. 0: flat. Absent: unknown and estimated."),
+    ] = None
     box_px: Annotated[
         tuple[float, float, float, float] | None,
         Field(description="Its box in one frame: left, top, right, bottom; px. Absent: the detector finds it."),

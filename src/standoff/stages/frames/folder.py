@@ -14,8 +14,8 @@ import av
 
 from standoff.core.errors import SourceError
 from standoff.stages.frames.album import read_album
-from standoff.stages.frames.photograph import read_photograph
 from standoff.stages.frames.fingerprint import fingerprint
+from standoff.stages.frames.photograph import read_photograph
 from standoff.stages.frames.pictures import AvPicture, Scaler
 from standoff.stages.frames.reader import TIME_ROUNDING_S, Shot, check_size
 

@@ -173,9 +173,7 @@ class FusedGround:
         self._noted(self._filter.now.state if self._filter.now is not None else fit.state)
         return True
 
-    def _search(
-        self, gray: ImageArray, time_s: float, detections: Detections, carried: bool
-    ) -> NoGroundMap | None:
+    def _search(self, gray: ImageArray, time_s: float, detections: Detections, carried: bool) -> NoGroundMap | None:
         """Find the reference anew where it is known or detected to be; None where there is something to map with."""
         now = self._filter.now
         box = self._box_now(time_s, detections)

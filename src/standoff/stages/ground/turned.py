@@ -1,4 +1,4 @@
-"""Which corner is which, for a shape that can be turned onto itself: the site frame must not turn from frame to frame."""
+"""Which corner is which, for a shape that can be turned onto itself: the site frame must not turn in between."""
 
 from __future__ import annotations
 
