@@ -14,6 +14,7 @@ PUBLIC_NAMES = {
         "DEFAULT_CLASS_MAP", "SHIPPED_MODELS", "DetectParams", "OnnxDetector", "ShippedModel", "available_providers",
         "find_model",
     },
+    "standoff.stages.motion": {"MotionEstimator", "MotionParams"},
     "standoff.stages.track": {"TrackParams", "Tracker"},
     "standoff.stages.locate": {"LocateParams", "Locator"},
     "standoff.stages.proximity": {"ProximityMeter", "ProximityParams", "side_classes"},
