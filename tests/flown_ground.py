@@ -25,7 +25,9 @@ def rough(seed: int) -> ImageArray:
     """Return ground from above: stones of a few texels, and larger patches."""
     rng = np.random.default_rng(seed)
     fine = cv2.GaussianBlur(rng.normal(0.0, 1.0, (_SIDE, _SIDE)).astype(np.float32), (0, 0), 1.8)
-    coarse = cv2.resize(rng.normal(0.0, 18.0, (40, 40)).astype(np.float32), (_SIDE, _SIDE), interpolation=cv2.INTER_CUBIC)
+    coarse = cv2.resize(
+        rng.normal(0.0, 18.0, (40, 40)).astype(np.float32), (_SIDE, _SIDE), interpolation=cv2.INTER_CUBIC
+    )
     return np.asarray(np.clip(120.0 + fine * (25.0 / fine.std()) + coarse, 0, 255), dtype=np.uint8)
 
 
@@ -34,7 +36,9 @@ GROUND, OTHER_GROUND = rough(1), rough(2)
 
 def seen(ground_to_image: FloatArray, *, ground: ImageArray = GROUND, noise: float = 2.0, seed: int = 0) -> ImageArray:
     """Return what a camera without distortion sees, with sensor noise."""
-    clean = cv2.warpPerspective(ground, ground_to_image @ _TO_GROUND, SIZE_PX, flags=cv2.INTER_LINEAR).astype(np.float32)
+    clean = cv2.warpPerspective(ground, ground_to_image @ _TO_GROUND, SIZE_PX, flags=cv2.INTER_LINEAR).astype(
+        np.float32
+    )
     noisy = clean + np.random.default_rng(seed).standard_normal(clean.shape, dtype=np.float32) * noise
     return np.asarray(np.clip(np.rint(noisy), 0, 255), dtype=np.uint8)
 

@@ -118,7 +118,7 @@ FOLLOWED_PX = 0.15
 HALF_SEEN_PX = 0.8
 """As FOLLOWED_PX at the far side of a picture of which more than half is covered: the rest, extrapolated."""
 
-COMPOSED_PX = 0.5
+COMPOSED_PX = 0.8
 """Two chains of some keyframes each, every link as good as FOLLOWED_PX, at the corners of pictures that turn."""
 
 COASTED_PX = 6.0

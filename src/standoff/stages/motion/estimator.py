@@ -172,11 +172,7 @@ class MotionEstimator:
     def _lost(self, picture: FollowedPicture, movers_px: FloatArray) -> NoCameraMotion:
         self._forget_step()
         before = self._before
-        cut = (
-            before is not None
-            and not picture.is_blank()
-            and picture.likeness(before) < self._params.cut_likeness
-        )
+        cut = before is not None and not picture.is_blank() and picture.likeness(before) < self._params.cut_likeness
         self._now = NoCameraMotion(CUT if cut else TOO_LITTLE)
         result = self._now
         if cut or picture.time_s - self._pose_s > self._params.max_lost_s:

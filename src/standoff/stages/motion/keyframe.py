@@ -97,9 +97,7 @@ class Keyframe:
         small_px = self._points.small_px
         return len(small_px) >= self._params.min_points and _is_spread(small_px, self.picture)
 
-    def find(
-        self, picture: FollowedPicture, expected: FloatArray, movers_px: FloatArray, levels: int
-    ) -> Match | None:
+    def find(self, picture: FollowedPicture, expected: FloatArray, movers_px: FloatArray, levels: int) -> Match | None:
         """Look for the keyframe's ground in another picture.
 
         Args:

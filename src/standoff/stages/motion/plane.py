@@ -69,7 +69,7 @@ def fit_plane(
 ) -> PlaneMotion | None:
     """Fit the homography that most point pairs share.
 
-    Consensus by MAGSAC, then reweighted least squares of the distances in the target with Tukey's weights, at the
+    Consensus by RANSAC or MAGSAC, then reweighted least squares of the distances in the target with Tukey's weights, at the
     scale of the residuals themselves.
 
     Args:
@@ -149,11 +149,15 @@ def _second_shift(plane: PlaneMotion) -> FloatArray:
 def _consensus(source: FloatArray, target: FloatArray, inlier_px: float) -> tuple[FloatArray | None, float]:
     """Return a matrix that many pairs agree with, and how far off they may be; None where too few agree.
 
-    A majority that agrees closely goes first: a loose one may bend to take in a second, slower motion beside it.
+    A majority that agrees closely goes first, by plain counting: a loose one, and MAGSAC's, which looks further than
+    its limit, may bend to take in a second, slower motion beside it.
     """
-    for reach_px, least in ((_CLOSELY * inlier_px, _MAJORITY * len(source)), (inlier_px, 0.0)):
+    for method, reach_px, least in (
+        (cv2.RANSAC, _CLOSELY * inlier_px, _MAJORITY * len(source)),
+        (cv2.USAC_MAGSAC, inlier_px, 0.0),
+    ):
         start, consenting = cv2.findHomography(
-            source, target, cv2.USAC_MAGSAC, reach_px, maxIters=_RANSAC_ROUNDS, confidence=_RANSAC_CONFIDENCE
+            source, target, method, reach_px, maxIters=_RANSAC_ROUNDS, confidence=_RANSAC_CONFIDENCE
         )
         if start is not None and np.count_nonzero(consenting) >= max(least, MIN_PAIRS):
             return start, reach_px
