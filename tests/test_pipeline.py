@@ -6,12 +6,22 @@ import numpy as np
 import pytest
 
 from standoff.core.errors import SourceTruncated
-from standoff.core.types import Detections, Frame, FrameResult, GroundMap, NoGroundMap, Outcome
+from standoff.core.types import (
+    CameraMotion,
+    Detections,
+    Frame,
+    FrameResult,
+    GroundMap,
+    NoCameraMotion,
+    NoGroundMap,
+    Outcome,
+)
 from standoff.pipeline import Pipeline
 from standoff.stages.frames import frame_from_array
 from standoff.stages.ground import Unmapped
 from standoff.stages.hazard import HazardMonitor
 from standoff.stages.locate import Locator
+from standoff.stages.motion import MotionEstimator
 from standoff.stages.proximity import ProximityMeter
 from standoff.stages.track import Tracker
 
@@ -49,7 +59,9 @@ class TwoWalkers:
 class MetreGround:
     """Ten pixels are a metre, everywhere."""
 
-    def update(self, frame: Frame, detections: Detections) -> GroundMap | NoGroundMap:
+    def update(
+        self, frame: Frame, detections: Detections, motion: CameraMotion | NoCameraMotion
+    ) -> GroundMap | NoGroundMap:
         matrix = np.diag([0.1, 0.1, 1.0])
         return GroundMap(matrix, np.zeros((9, 9)), frame.size_px, "test", 0.1)
 
@@ -65,6 +77,7 @@ def pipeline(source: Iterator[Frame], *sinks: Memory, detect_every: int = 1, map
     return Pipeline(
         frames=source,
         detector=TwoWalkers(),
+        motion=MotionEstimator(),
         ground=MetreGround() if mapped else Unmapped(),
         tracker=Tracker(),
         locator=Locator(),
@@ -87,7 +100,7 @@ def test_every_frame_reaches_every_sink_with_the_time_of_each_stage() -> None:
     assert (
         [result.frame.index for result in memory.results] == [result.frame.index for result in results] == [*range(5)]
     )
-    stages = {"frames", "detect", "ground", "track", "locate", "proximity", "hazard", "sinks.sink0"}
+    stages = {"frames", "detect", "motion", "ground", "track", "locate", "proximity", "hazard", "sinks.sink0"}
     assert set(results[0].stage_ms) == stages
     assert memory.outcomes[0].status == "complete"
 

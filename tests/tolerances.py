@@ -111,3 +111,16 @@ FLOAT32_LOSS_REL = 2e-5
 
 FLOAT32_BOX_PX = 2e-3
 """Boxes of ONNX Runtime against torch at 128 px: float32 sums in another order, times exp."""
+
+FOLLOWED_PX = 0.15
+"""The largest error over the picture of a motion from some hundred points that are each good to 0.05-0.15 px."""
+
+HALF_SEEN_PX = 0.8
+"""As FOLLOWED_PX at the far side of a picture of which more than half is covered: the rest, extrapolated."""
+
+COMPOSED_PX = 0.8
+"""Two chains of some keyframes each, every link as good as FOLLOWED_PX, at the corners of pictures that turn."""
+
+COASTED_PX = 6.0
+"""Centres of boxes that coast for 0.6 s on velocities filtered in five frames a second while people's headings turn in
+the picture; with the motion ignored it is more than 100."""

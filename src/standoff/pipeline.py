@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from time import perf_counter
 
 from standoff.core.protocols import (
+    CameraMotionEstimator,
     Detector,
     Ground,
     HazardMonitor,
@@ -36,6 +37,7 @@ class Pipeline:
     Attributes:
         frames: The source.
         detector: Runs on every `detect_every`-th frame, unless it rests there; tracks coast in between.
+        motion: Reads every frame.
         ground: Reads every frame.
         sinks: By name. One that fails is logged and left out from then on; the others go on.
         sink_errors: Message of each sink that failed.
@@ -43,6 +45,7 @@ class Pipeline:
 
     frames: Iterable[Frame]
     detector: Detector
+    motion: CameraMotionEstimator
     ground: Ground
     tracker: Tracker
     locator: Locator
@@ -89,17 +92,23 @@ class Pipeline:
         if detect:
             with _clocked(stage_ms, "detect"):
                 detections = self.detector.detect(frame)
+        with _clocked(stage_ms, "motion"):
+            motion = self.motion.update(frame, detections)
         with _clocked(stage_ms, "ground"):
-            ground = self.ground.update(frame, detections)
+            ground = self.ground.update(frame, detections, motion)
         with _clocked(stage_ms, "track"):
-            tracks = self.tracker.update(frame.time_s, detections) if detect else self.tracker.coast(frame.time_s)
+            tracks = (
+                self.tracker.update(frame.time_s, detections, motion)
+                if detect
+                else self.tracker.coast(frame.time_s, motion)
+            )
         with _clocked(stage_ms, "locate"):
             positions = self.locator.update(frame.time_s, tracks, ground)
         with _clocked(stage_ms, "proximity"):
             proximities = self.proximity.update(frame.time_s, positions, ground)
         with _clocked(stage_ms, "hazard"):
             hazards = self.hazard.update(frame.time_s, positions, proximities, ground)
-        return FrameResult(frame, detections, detect, ground, tracks, positions, proximities, hazards, stage_ms)
+        return FrameResult(frame, detections, detect, motion, ground, tracks, positions, proximities, hazards, stage_ms)
 
     def _write(self, result: FrameResult, stage_ms: dict[str, float]) -> None:
         for name, sink in self.sinks.items():

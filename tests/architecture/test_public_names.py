@@ -17,6 +17,7 @@ PUBLIC_NAMES = {
     "standoff.clips": {
         "COLUMNS", "DETECTIONS_FILE", "RecordedDetections", "is_recording", "metadata_of", "read_detections",
     },
+    "standoff.stages.motion": {"MotionEstimator", "MotionParams"},
     "standoff.stages.track": {"TrackParams", "Tracker"},
     "standoff.stages.locate": {"LocateParams", "Locator"},
     "standoff.stages.proximity": {"ProximityMeter", "ProximityParams", "side_classes"},

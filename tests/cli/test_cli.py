@@ -18,6 +18,7 @@ import yaml
 from cli.calling import Call
 
 from standoff.core.errors import GroundError
+from standoff.core.protocols import AnyMotion
 from standoff.core.types import Detections, Frame, NoGroundMap
 
 OUTPUTS = {
@@ -226,7 +227,7 @@ def test_a_truncated_video_keeps_what_was_read_and_says_that_it_is_not_all(
 class Unplugged:
     """A ground stage whose sensor is not there."""
 
-    def update(self, frame: Frame, detections: Detections) -> NoGroundMap:
+    def update(self, frame: Frame, detections: Detections, motion: AnyMotion) -> NoGroundMap:
         raise GroundError(expected="a sensor", found="none", fix="plug it in")
 
 

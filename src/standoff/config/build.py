@@ -9,13 +9,14 @@ from typing import Any
 from standoff.config.settings import Replacement, Settings, StageName
 from standoff.core.camera import Camera
 from standoff.core.errors import ConfigError
-from standoff.core.protocols import Detector, Ground
+from standoff.core.protocols import CameraMotionEstimator, Detector, Ground
 from standoff.core.types import Frame
 from standoff.pipeline import Pipeline
 from standoff.stages.detect import OnnxDetector, RecordedDetector, find_model
 from standoff.stages.ground import ReferenceGround, Unmapped, load_camera, load_survey
 from standoff.stages.hazard import HazardMonitor
 from standoff.stages.locate import Locator
+from standoff.stages.motion import MotionEstimator
 from standoff.stages.proximity import ProximityMeter, side_classes
 from standoff.stages.track import Tracker
 
@@ -67,13 +68,26 @@ def build_detector(settings: Settings) -> Detector:
     return OnnxDetector(find_model(settings.model), settings.detect)
 
 
+def _configured_camera(settings: Settings) -> Camera | None:
+    return load_camera(settings.ground.camera) if settings.ground.camera else None
+
+
+def build_motion(settings: Settings) -> CameraMotionEstimator:
+    """Make what follows the picture, without the lens distortion where a camera file is given.
+
+    Raises:
+        GroundError: The camera file cannot be used.
+    """
+    return MotionEstimator(settings.motion, _configured_camera(settings))
+
+
 def build_ground(settings: Settings) -> Ground:
     """Make the configured ground stage.
 
     Raises:
         GroundError: Its points, shape or camera file cannot be used.
     """
-    camera: Camera | None = load_camera(settings.ground.camera) if settings.ground.camera else None
+    camera = _configured_camera(settings)
     if settings.ground.survey is not None:
         return load_survey(settings.ground.survey, camera=camera)
     reference = settings.ground.reference
@@ -91,6 +105,7 @@ def build_ground(settings: Settings) -> Ground:
 
 _MAKERS: Mapping[StageName, Callable[[Settings], Any]] = {
     "detect": build_detector,
+    "motion": build_motion,
     "ground": build_ground,
     "track": lambda settings: Tracker(settings.track),
     "locate": lambda settings: Locator(settings.locate),
@@ -149,6 +164,7 @@ def build_pipeline(settings: Settings, frames: Iterable[Frame]) -> Pipeline:
     return Pipeline(
         frames=frames,
         detector=detector,
+        motion=build_stage("motion", settings),
         ground=build_stage("ground", settings),
         tracker=build_stage("track", settings),
         locator=build_stage("locate", settings),

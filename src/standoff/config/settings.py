@@ -15,15 +15,16 @@ from standoff.stages.detect import DetectParams, ShippedModel
 from standoff.stages.ground import ReferenceParams, ReferenceShape
 from standoff.stages.hazard import HazardParams
 from standoff.stages.locate import LocateParams
+from standoff.stages.motion import MotionParams
 from standoff.stages.proximity import ProximityParams
 from standoff.stages.sinks import ReportParams, TableParams, VideoParams
 from standoff.stages.track import TrackParams
 
 Point = tuple[float, float]
-StageName = Literal["detect", "ground", "track", "locate", "proximity", "hazard"]
-STAGE_NAMES: tuple[StageName, ...] = ("detect", "ground", "track", "locate", "proximity", "hazard")
 OutputName = Literal["tracks", "proximity", "frames", "detections", "hazards", "video", "report"]
 OUTPUT_NAMES: tuple[OutputName, ...] = ("tracks", "proximity", "frames", "detections", "hazards", "video", "report")
+StageName = Literal["detect", "motion", "ground", "track", "locate", "proximity", "hazard"]
+STAGE_NAMES: tuple[StageName, ...] = ("detect", "motion", "ground", "track", "locate", "proximity", "hazard")
 
 
 class _Section(BaseModel):
@@ -150,6 +151,7 @@ class Settings(BaseSettings):
     ] = None
     detect_every: Annotated[int, Field(ge=1, description="Detect on every k-th frame read; tracks coast between.")] = 1
     detect: Annotated[DetectParams, Field(description="The detector.")] = DetectParams()
+    motion: Annotated[MotionParams, Field(description="How the picture is followed.")] = MotionParams()
     ground: Annotated[GroundSettings, Field(description="The ground map.")] = GroundSettings()
     track: Annotated[TrackParams, Field(description="The tracker.")] = TrackParams()
     locate: Annotated[LocateParams, Field(description="From boxes to places on the ground.")] = LocateParams()

@@ -395,6 +395,7 @@ class FrameResult:
         frame: The frame.
         detections: Empty on frames where the detector rested.
         detected: False on frames where the detector rested (`detect_every`).
+        motion: How the picture of the ground moved, or why that is not known.
         ground: The map, or why there is none.
         tracks: Live tracks.
         positions: Row i belongs to track i.
@@ -406,6 +407,7 @@ class FrameResult:
     frame: Frame
     detections: Detections
     detected: bool
+    motion: CameraMotion | NoCameraMotion
     ground: GroundMap | NoGroundMap
     tracks: Tracks
     positions: GroundPositions

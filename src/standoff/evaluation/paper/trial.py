@@ -100,6 +100,7 @@ def build_monitor(clip: Clip, trial: Trial, source: Source) -> Pipeline:
     return Pipeline(
         frames=source,
         detector=detector,
+        motion=build_stage("motion", settings),
         ground=build_stage("ground", settings),
         tracker=tracker,
         locator=build_stage("locate", settings),

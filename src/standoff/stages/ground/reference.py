@@ -12,7 +12,7 @@ from standoff.core import homography
 from standoff.core.camera import Camera
 from standoff.core.errors import GroundError
 from standoff.core.homography import FloatArray
-from standoff.core.types import Detections, Frame, GroundMap, ImageArray, NoGroundMap
+from standoff.core.types import CameraMotion, Detections, Frame, GroundMap, ImageArray, NoCameraMotion, NoGroundMap
 from standoff.stages.ground.correspondence import camera_misfit_px, turn_from_before
 from standoff.stages.ground.follow import BoxFollower, moved_box
 from standoff.stages.ground.outline import OutlineFinder
@@ -89,12 +89,15 @@ class ReferenceGround:
             "lens_distortion_removed": self._given_camera is not None,
         }
 
-    def update(self, frame: Frame, detections: Detections) -> GroundMap | NoGroundMap:
+    def update(
+        self, frame: Frame, detections: Detections, motion: CameraMotion | NoCameraMotion
+    ) -> GroundMap | NoGroundMap:
         """Map one frame.
 
         Args:
             frame: Frames in the order of their time.
             detections: Of this frame; empty where the detector rested.
+            motion: Plays no part.
 
         Returns:
             The map from undistorted pixels to metres, observed in this frame, or why there is none.
