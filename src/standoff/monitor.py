@@ -83,7 +83,7 @@ def open_run(source: Path | str, out: Path | str, settings: Settings, *, overwri
         fps=settings.fps,
         telemetry=settings.telemetry,
     )
-    pipeline = build_pipeline(settings, frames)
+    pipeline = build_pipeline(settings, frames, frames.camera_prior)
     if (check_size := getattr(pipeline.ground, "check_size", None)) is not None:
         check_size(frames.size_px)
     if isinstance(pipeline.detector, RecordedDetector):

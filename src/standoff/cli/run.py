@@ -33,19 +33,31 @@ def _numbers(text: str, count: int, option: str) -> tuple[float, ...]:
     return numbers
 
 
+def _shape_overrides(ground: str) -> dict[str, Any] | None:
+    """Translate `square:SIDE` and `rectangle:LENGTH,WIDTH`, each with `,height=H` or without, into settings."""
+    kind, _, rest = ground.partition(":")
+    count = {"square": 1, "rectangle": 2}.get(kind)
+    if count is None:
+        return None
+    lengths, _, height = rest.partition(",height=")
+    option = f"--ground {kind}:{'SIDE' if count == 1 else 'LENGTH,WIDTH'}"
+    numbers = _numbers(lengths, count, option)
+    # The file's reference may have another shape; its box and method go on.
+    shape: dict[str, Any] = dict.fromkeys(("square_m", "rectangle_m", "sides_m", "diagonal_m", "corners_m", "height_m"))
+    shape[f"{kind}_m"] = numbers[0] if count == 1 else numbers
+    if height:
+        shape["height_m"] = _numbers(height, 1, f"{option},height=H")[0]
+    return shape
+
+
 def _ground_overrides(ground: str | None, box: str | None, camera: Path | None) -> dict[str, Any]:
     """Translate `--ground`, `--reference-box` and `--camera` into settings."""
     overrides: dict[str, Any] = {}
-    if ground is not None and ground.startswith("square:"):
-        # The file's reference may have another shape; its box and method go on.
-        others = dict.fromkeys(("rectangle_m", "sides_m", "diagonal_m", "corners_m"))
-        side_m = _numbers(ground.removeprefix("square:"), 1, "--ground square:SIDE")[0]
-        overrides["reference"] = {"square_m": side_m, **others}
-        overrides["survey"] = None
-    elif ground == "none":
+    if ground == "none":
         overrides |= {"survey": None, "reference": None}
     elif ground is not None:
-        overrides |= {"survey": ground, "reference": None}
+        shape = _shape_overrides(ground)
+        overrides |= {"survey": None if shape else ground, "reference": shape}
     if box is not None:
         overrides.setdefault("reference", {})
         if overrides["reference"] is None:
@@ -86,7 +98,8 @@ def run(
     ] = None,
     ground: Annotated[
         str | None,
-        typer.Option(help="survey.yaml (surveyed points), square:SIDE (a square reference, side in m), or none."),
+        typer.Option(help="square:SIDE or rectangle:LENGTH,WIDTH (a reference object, m; ,height=H where its top is so high "
+            "above the ground), survey.yaml (surveyed points), or none."),
     ] = None,
     reference_box: Annotated[
         str | None, typer.Option(help="Box of the reference in the first frame: left,top,right,bottom px.")

@@ -7,13 +7,13 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from standoff.config.settings import Replacement, Settings, StageName
-from standoff.core.camera import Camera
+from standoff.core.camera import Camera, CameraPrior
 from standoff.core.errors import ConfigError
 from standoff.core.protocols import CameraMotionEstimator, Detector, Ground
 from standoff.core.types import Frame
 from standoff.pipeline import Pipeline
 from standoff.stages.detect import OnnxDetector, RecordedDetector, find_model
-from standoff.stages.ground import ReferenceGround, Unmapped, load_camera, load_survey
+from standoff.stages.ground import FusedGround, GivenPlace, ReferenceGround, Unmapped, load_camera, load_survey
 from standoff.stages.hazard import HazardMonitor
 from standoff.stages.locate import Locator
 from standoff.stages.motion import MotionEstimator
@@ -81,8 +81,12 @@ def build_motion(settings: Settings) -> CameraMotionEstimator:
     return MotionEstimator(settings.motion, _configured_camera(settings))
 
 
-def build_ground(settings: Settings) -> Ground:
+def build_ground(settings: Settings, known: CameraPrior | None = None) -> Ground:
     """Make the configured ground stage.
+
+    Args:
+        settings: Of everything.
+        known: What the source knows of its camera; a camera file knows better.
 
     Raises:
         GroundError: Its points, shape or camera file cannot be used.
@@ -93,20 +97,23 @@ def build_ground(settings: Settings) -> Ground:
     reference = settings.ground.reference
     if reference is None:
         return Unmapped()
-    return ReferenceGround(
+    place = GivenPlace(reference.box_px, reference.box_time_s, reference.first_corner_px)
+    method = reference.params.method
+    if method not in ("fused", "refined"):
+        return ReferenceGround(reference.shape(), reference.params, place=place, camera=camera)
+    return FusedGround(
         reference.shape(),
         reference.params,
-        box_xyxy_px=reference.box_px,
-        box_time_s=reference.box_time_s,
-        first_corner_px=reference.first_corner_px,
-        camera=camera,
+        height_m=reference.height_m,
+        place=place,
+        camera=known if camera is None else CameraPrior.calibrated(camera),
+        remember=method == "fused",
     )
 
 
 _MAKERS: Mapping[StageName, Callable[[Settings], Any]] = {
     "detect": build_detector,
     "motion": build_motion,
-    "ground": build_ground,
     "track": lambda settings: Tracker(settings.track),
     "locate": lambda settings: Locator(settings.locate),
     "proximity": lambda settings: ProximityMeter(settings.proximity),
@@ -114,8 +121,13 @@ _MAKERS: Mapping[StageName, Callable[[Settings], Any]] = {
 }
 
 
-def build_stage(name: StageName, settings: Settings) -> Any:  # noqa: ANN401
+def build_stage(name: StageName, settings: Settings, camera: CameraPrior | None = None) -> Any:  # noqa: ANN401
     """Make one stage, standoff's own or the configured replacement.
+
+    Args:
+        name: Of the stage.
+        settings: Of everything.
+        camera: What the source knows of its camera.
 
     Raises:
         StandoffError: Something that the settings name cannot be used.
@@ -123,6 +135,8 @@ def build_stage(name: StageName, settings: Settings) -> Any:  # noqa: ANN401
     is_replayed = name == "detect" and settings.detections is not None
     if name in settings.replace and not is_replayed:
         return build_replacement(name, settings.replace[name])
+    if name == "ground":
+        return build_ground(settings, camera)
     return _MAKERS[name](settings)
 
 
@@ -149,12 +163,13 @@ def _check_visible(settings: Settings, detector: Detector) -> None:
         )
 
 
-def build_pipeline(settings: Settings, frames: Iterable[Frame]) -> Pipeline:
+def build_pipeline(settings: Settings, frames: Iterable[Frame], camera: CameraPrior | None = None) -> Pipeline:
     """Make one stream's pipeline, without sinks; all state belongs to the objects made here.
 
     Args:
         settings: What to build.
         frames: The source.
+        camera: What the source knows of its camera.
 
     Raises:
         StandoffError: A model, survey, camera or replacement that cannot be used.
@@ -165,7 +180,7 @@ def build_pipeline(settings: Settings, frames: Iterable[Frame]) -> Pipeline:
         frames=frames,
         detector=detector,
         motion=build_stage("motion", settings),
-        ground=build_stage("ground", settings),
+        ground=build_stage("ground", settings, camera),
         tracker=build_stage("track", settings),
         locator=build_stage("locate", settings),
         proximity=build_stage("proximity", settings),

@@ -7,6 +7,7 @@ import pytest
 from drawn_ground import box_around, frame, lens, picture, view
 from tolerances import REFERENCE_GROUND_REL
 
+from standoff.stages.ground.where import NOT_SEEN, NOT_YET, GivenPlace
 from standoff.core import homography
 from standoff.core.camera import Camera
 from standoff.core.classes import CLASS_BY_NAME
@@ -15,7 +16,7 @@ from standoff.core.homography import FloatArray
 from standoff.core.types import Detections, GroundMap, ImageArray, NoCameraMotion, NoGroundMap
 from standoff.stages.ground import ReferenceGround, ReferenceParams, ReferenceShape
 from standoff.stages.ground.params import ReferenceMethod
-from standoff.stages.ground.reference import AMBIGUOUS, IMPLAUSIBLE, LOST, NOT_SEEN, NOT_YET
+from standoff.stages.ground.reference import AMBIGUOUS, IMPLAUSIBLE, LOST
 
 METHODS: tuple[ReferenceMethod, ...] = ("paper", "paper+tls", "oriented")
 FOOTING = ReferenceShape.square(2.89)
@@ -70,7 +71,7 @@ def length_errors(ground: GroundMap, ground_to_image: FloatArray, shape: Referen
 @pytest.mark.parametrize("shape", [FOOTING, QUADRILATERAL])
 def test_metres_are_recovered_around_the_reference(shape: ReferenceShape, yaw_deg: float) -> None:
     gray, ground_to_image, box = seen(shape, yaw_deg=yaw_deg)
-    ground = mapped(ReferenceGround(shape, box_xyxy_px=box, camera=LENS).update(frame(gray), NOTHING, STILL))
+    ground = mapped(ReferenceGround(shape, place=GivenPlace(box_xyxy_px=box), camera=LENS).update(frame(gray), NOTHING, STILL))
     assert np.abs(length_errors(ground, ground_to_image, shape)).max() < REFERENCE_GROUND_REL
     assert ground.method == "reference:oriented"
 
@@ -79,7 +80,7 @@ def test_metres_are_recovered_around_the_reference(shape: ReferenceShape, yaw_de
 def test_every_method_maps_the_footing_of_the_paper(method: ReferenceMethod) -> None:
     gray, ground_to_image, box = seen(FOOTING)
     ground = mapped(
-        ReferenceGround(FOOTING, ReferenceParams(method=method), box_xyxy_px=box).update(frame(gray), NOTHING, STILL)
+        ReferenceGround(FOOTING, ReferenceParams(method=method), place=GivenPlace(box_xyxy_px=box)).update(frame(gray), NOTHING, STILL)
     )
     limit = REFERENCE_GROUND_REL * (10.0 if method == "paper" else 2.0)
     assert np.abs(length_errors(ground, ground_to_image, FOOTING)).max() < limit
@@ -88,7 +89,7 @@ def test_every_method_maps_the_footing_of_the_paper(method: ReferenceMethod) -> 
 
 def test_corners_of_an_uneven_shape_get_their_own_coordinates() -> None:
     gray, ground_to_image, box = seen(QUADRILATERAL, yaw_deg=200.0)
-    ground = mapped(ReferenceGround(QUADRILATERAL, box_xyxy_px=box, camera=LENS).update(frame(gray), NOTHING, STILL))
+    ground = mapped(ReferenceGround(QUADRILATERAL, place=GivenPlace(box_xyxy_px=box), camera=LENS).update(frame(gray), NOTHING, STILL))
     found, _ = ground.to_ground(homography.apply(ground_to_image, QUADRILATERAL.corners_m)[0])
     np.testing.assert_allclose(found, QUADRILATERAL.corners_m, atol=0.02)
 
@@ -96,7 +97,7 @@ def test_corners_of_an_uneven_shape_get_their_own_coordinates() -> None:
 def test_the_distortion_of_a_wide_lens_is_removed() -> None:
     shape = ReferenceShape.square(6.0)
     gray, ground_to_image, box = seen(shape, camera=WIDE)
-    with_camera = mapped(ReferenceGround(shape, box_xyxy_px=box, camera=WIDE).update(frame(gray), NOTHING, STILL))
+    with_camera = mapped(ReferenceGround(shape, place=GivenPlace(box_xyxy_px=box), camera=WIDE).update(frame(gray), NOTHING, STILL))
     assert np.abs(length_errors(with_camera, ground_to_image, shape)).max() < REFERENCE_GROUND_REL
     true_px = WIDE.distort(homography.apply(ground_to_image, shape.corners_m)[0])
     off = np.linalg.norm(with_camera.anchors_px[:, None] - true_px[None], axis=2).min(axis=1)
@@ -107,7 +108,7 @@ def test_stated_errors_of_the_map_are_of_the_size_of_the_real_ones() -> None:
     squares = []
     for yaw_deg in np.arange(0.0, 360.0, 24.0):
         gray, ground_to_image, box = seen(QUADRILATERAL, yaw_deg=float(yaw_deg))
-        stage = ReferenceGround(QUADRILATERAL, box_xyxy_px=box, camera=LENS)
+        stage = ReferenceGround(QUADRILATERAL, place=GivenPlace(box_xyxy_px=box), camera=LENS)
         ground = mapped(stage.update(frame(gray), NOTHING, STILL))
         point_px = homography.apply(ground_to_image, np.array([[7.0, 5.0]]))[0]
         jacobian = homography.parameter_jacobian(ground.image_to_ground, point_px)[0]
@@ -128,7 +129,7 @@ def flight(count: int, yaw_step_deg: float) -> list[tuple[ImageArray, FloatArray
 
 def test_the_site_frame_stays_while_the_drone_turns_around_and_only_the_first_box_is_given() -> None:
     frames = flight(25, 5.0)
-    stage = ReferenceGround(FOOTING, box_xyxy_px=box_around(frames[0][1], FOOTING.corners_m, LENS), camera=LENS)
+    stage = ReferenceGround(FOOTING, place=GivenPlace(box_xyxy_px=box_around(frames[0][1], FOOTING.corners_m, LENS)), camera=LENS)
     first = None
     post = np.array([[4.0, 3.0]])
     for k, (gray, ground_to_image) in enumerate(frames):
@@ -143,7 +144,7 @@ def test_the_same_frames_give_the_same_maps() -> None:
     box = box_around(frames[0][1], FOOTING.corners_m, LENS)
     runs = []
     for _ in range(2):
-        stage = ReferenceGround(FOOTING, ReferenceParams(method="paper"), box_xyxy_px=box)
+        stage = ReferenceGround(FOOTING, ReferenceParams(method="paper"), place=GivenPlace(box_xyxy_px=box))
         runs.append([mapped(stage.update(frame(gray, k / 30), NOTHING, STILL)) for k, (gray, _) in enumerate(frames)])
     for one, two in zip(*runs, strict=True):
         np.testing.assert_array_equal(one.image_to_ground, two.image_to_ground)
@@ -152,7 +153,7 @@ def test_the_same_frames_give_the_same_maps() -> None:
 
 def test_a_hidden_reference_is_lost_then_found_again_in_the_same_site_frame() -> None:
     gray, ground_to_image, box = seen(FOOTING)
-    stage = ReferenceGround(FOOTING, box_xyxy_px=box)
+    stage = ReferenceGround(FOOTING, place=GivenPlace(box_xyxy_px=box))
     before = mapped(stage.update(frame(gray, 0.0), NOTHING, STILL))
     hidden = np.random.default_rng(1).integers(60, 130, gray.shape).astype(np.uint8)
     assert reason(stage.update(frame(hidden, 0.1), NOTHING, STILL)) == LOST
@@ -218,7 +219,7 @@ def test_a_hint_is_a_place_in_the_picture_as_the_lens_shows_it() -> None:
     gray, ground_to_image, box = seen(shape, camera=WIDE)
     corners_px = WIDE.distort(homography.apply(ground_to_image, shape.corners_m)[0])
     for corner in range(4):
-        stage = ReferenceGround(shape, box_xyxy_px=box, first_corner_px=corners_px[corner], camera=WIDE)
+        stage = ReferenceGround(shape, place=GivenPlace(box_xyxy_px=box, first_corner_px=corners_px[corner]), camera=WIDE)
         ground = mapped(stage.update(frame(gray), NOTHING, STILL))
         np.testing.assert_allclose(ground.anchors_px[0], corners_px[corner], atol=0.3)
 
@@ -227,10 +228,10 @@ def test_a_shape_whose_corners_cannot_be_told_apart_is_not_guessed_at() -> None:
     shape = ReferenceShape.rectangle(2.8, 2.9)
     gray, ground_to_image, box = seen(shape)
     assert shape.turns_onto_itself() == (0, 2)
-    assert reason(ReferenceGround(shape, box_xyxy_px=box).update(frame(gray), NOTHING, STILL)) == AMBIGUOUS
+    assert reason(ReferenceGround(shape, place=GivenPlace(box_xyxy_px=box)).update(frame(gray), NOTHING, STILL)) == AMBIGUOUS
     for corner in range(4):
         hint = homography.apply(ground_to_image, shape.corners_m)[0][corner] + 4.0
-        stage = ReferenceGround(shape, box_xyxy_px=box, first_corner_px=hint)
+        stage = ReferenceGround(shape, place=GivenPlace(box_xyxy_px=box, first_corner_px=hint))
         for time_s in (0.0, 0.1):
             ground = mapped(stage.update(frame(gray, time_s), NOTHING, STILL))
             at = homography.apply(homography.invert(ground.image_to_ground), shape.corners_m[:1])[0][0]
@@ -241,7 +242,7 @@ def test_an_outline_that_is_not_the_shape_is_refused() -> None:
     gray, _, box = seen(FOOTING)
     plank = ReferenceShape.rectangle(1.0, 4.0)
     for method in METHODS:
-        stage = ReferenceGround(plank, ReferenceParams(method=method), box_xyxy_px=box, camera=LENS)
+        stage = ReferenceGround(plank, ReferenceParams(method=method), place=GivenPlace(box_xyxy_px=box), camera=LENS)
         ground = stage.update(frame(gray), NOTHING, STILL)
         assert not ground
         if method != "oriented":  # which passes over what it cannot be, and finds nothing else
@@ -250,10 +251,10 @@ def test_an_outline_that_is_not_the_shape_is_refused() -> None:
 
 def test_a_box_is_used_at_its_time() -> None:
     gray, _, box = seen(FOOTING)
-    stage = ReferenceGround(FOOTING, box_xyxy_px=box, box_time_s=1.0)
+    stage = ReferenceGround(FOOTING, place=GivenPlace(box_xyxy_px=box, box_time_s=1.0))
     assert reason(stage.update(frame(gray, 0.0), NOTHING, STILL)) == NOT_YET
     assert stage.update(frame(gray, 1.0), NOTHING, STILL)
-    late = ReferenceGround(FOOTING, box_xyxy_px=box, box_time_s=1.0)
+    late = ReferenceGround(FOOTING, place=GivenPlace(box_xyxy_px=box, box_time_s=1.0))
     with pytest.raises(GroundError, match="a frame at 1 s"):
         late.update(frame(gray, 3.0), NOTHING, STILL)
 
@@ -268,7 +269,7 @@ def test_a_box_is_used_at_its_time() -> None:
 )
 def test_a_box_that_is_none_is_refused_at_once(box: list[float], found: str) -> None:
     with pytest.raises(GroundError) as caught:
-        ReferenceGround(FOOTING, box_xyxy_px=box)
+        ReferenceGround(FOOTING, place=GivenPlace(box_xyxy_px=box))
     assert found in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -276,10 +277,10 @@ def test_a_box_that_is_none_is_refused_at_once(box: list[float], found: str) -> 
 def test_a_box_or_camera_that_does_not_fit_the_pictures_is_refused() -> None:
     gray, _, box = seen(FOOTING)
     with pytest.raises(GroundError, match="480x360"):
-        ReferenceGround(FOOTING, box_xyxy_px=box + 1000.0).update(frame(gray), NOTHING, STILL)
+        ReferenceGround(FOOTING, place=GivenPlace(box_xyxy_px=box + 1000.0)).update(frame(gray), NOTHING, STILL)
     square_camera = Camera(400, 400, LENS.matrix, LENS.distortion)
     with pytest.raises(GroundError, match="400x400"):
-        ReferenceGround(FOOTING, box_xyxy_px=box, camera=square_camera).update(frame(gray), NOTHING, STILL)
+        ReferenceGround(FOOTING, place=GivenPlace(box_xyxy_px=box), camera=square_camera).update(frame(gray), NOTHING, STILL)
 
 
 def test_a_hint_goes_with_the_first_detection_too() -> None:
@@ -287,7 +288,7 @@ def test_a_hint_goes_with_the_first_detection_too() -> None:
     gray, ground_to_image, box = seen(shape)
     corners_px = homography.apply(ground_to_image, shape.corners_m)[0]
     for corner in range(4):
-        stage = ReferenceGround(shape, first_corner_px=corners_px[corner])
+        stage = ReferenceGround(shape, place=GivenPlace(first_corner_px=corners_px[corner]))
         assert reason(stage.update(frame(gray), NOTHING, STILL)) == NOT_SEEN
         ground = mapped(stage.update(frame(gray, 0.1), detected(box), STILL))
         np.testing.assert_allclose(ground.anchors_px[0], corners_px[corner], atol=0.5)
@@ -295,23 +296,21 @@ def test_a_hint_goes_with_the_first_detection_too() -> None:
 
 def test_a_hint_lies_in_its_box() -> None:
     with pytest.raises(GroundError, match="first_corner_px x, y"):
-        ReferenceGround(FOOTING, first_corner_px=(5.0, float("nan")))
+        ReferenceGround(FOOTING, place=GivenPlace(first_corner_px=(5.0, float("nan"))))
     for bad in ((500.0, 5.0), (float("nan"), 5.0), (1.0, 2.0, 3.0)):
         with pytest.raises(GroundError, match="first_corner_px x, y"):
-            ReferenceGround(FOOTING, box_xyxy_px=(0.0, 0.0, 50.0, 50.0), first_corner_px=bad)
+            ReferenceGround(FOOTING, place=GivenPlace(box_xyxy_px=(0.0, 0.0, 50.0, 50.0), first_corner_px=bad))
 
 
 def test_eq_6_scale_is_metres_per_pixel_of_the_reference() -> None:
     gray, _, box = seen(FOOTING, tilt_deg=0.0, yaw_deg=0.0)
-    ground = mapped(ReferenceGround(FOOTING, box_xyxy_px=box).update(frame(gray), NOTHING, STILL))
+    ground = mapped(ReferenceGround(FOOTING, place=GivenPlace(box_xyxy_px=box)).update(frame(gray), NOTHING, STILL))
     # Straight down from 12 m with a focal length of 420 px: 35 px a metre.
     np.testing.assert_allclose(ground.scale_m_per_px, 1 / 35.0, rtol=REFERENCE_GROUND_REL)
 
 
 def test_the_description_is_plain_and_says_what_was_configured() -> None:
-    stage = ReferenceGround(
-        FOOTING, ReferenceParams(method="paper"), box_xyxy_px=(1, 2, 30, 40), first_corner_px=(2, 3)
-    )
+    stage = ReferenceGround(FOOTING, ReferenceParams(method="paper"), place=GivenPlace(box_xyxy_px=(1, 2, 30, 40), first_corner_px=(2, 3)))
     record = json.loads(json.dumps(stage.description))
     assert record["params"]["method"] == "paper"
     assert record["box_xyxy_px"] == [1, 2, 30, 40]

@@ -6,7 +6,19 @@ import pytest
 import tolerances
 from drawn_ground import SIZE_PX, lens
 from flown_ground import (
-    FPS, GROUND, LENS, NOTHING, OTHER_GROUND, error_px, flight, follow, frame, grid, moved, reason, seen,
+    FPS,
+    GROUND,
+    LENS,
+    NOTHING,
+    OTHER_GROUND,
+    error_px,
+    flight,
+    follow,
+    frame,
+    grid,
+    moved,
+    reason,
+    seen,
 )  # fmt: skip
 
 from standoff.core import homography

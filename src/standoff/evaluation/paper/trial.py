@@ -101,7 +101,7 @@ def build_monitor(clip: Clip, trial: Trial, source: Source) -> Pipeline:
         frames=source,
         detector=detector,
         motion=build_stage("motion", settings),
-        ground=build_stage("ground", settings),
+        ground=build_stage("ground", settings, source.camera_prior),
         tracker=tracker,
         locator=build_stage("locate", settings),
         proximity=build_stage("proximity", settings),

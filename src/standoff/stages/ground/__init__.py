@@ -3,6 +3,7 @@
 from standoff.stages.ground.boards import BoardView, find_corners, read_boards
 from standoff.stages.ground.calibration import CalibrationResult, calibrate, calibrate_views
 from standoff.stages.ground.camera_file import load_camera, save_camera
+from standoff.stages.ground.fused import FusedGround
 from standoff.stages.ground.params import ReferenceParams
 from standoff.stages.ground.reference import ReferenceGround
 from standoff.stages.ground.shape import ReferenceShape
@@ -10,10 +11,13 @@ from standoff.stages.ground.survey_file import load_survey
 from standoff.stages.ground.surveyed import SurveyedGround
 from standoff.stages.ground.telemetry_pose import TelemetryPose, view_from_telemetry
 from standoff.stages.ground.unmapped import Unmapped
+from standoff.stages.ground.where import GivenPlace
 
 __all__ = [
     "BoardView",
     "CalibrationResult",
+    "FusedGround",
+    "GivenPlace",
     "ReferenceGround",
     "ReferenceParams",
     "ReferenceShape",

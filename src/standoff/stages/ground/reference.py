@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -44,14 +43,9 @@ class ReferenceGround:
     Args:
         shape: The reference's true shape; it defines the site frame.
         params: Settings.
-        box_xyxy_px: (4,) left, top, right, bottom of the reference in one frame; None: the detector finds it.
-        box_time_s: Presentation timestamp of that frame; None: the first frame.
-        first_corner_px: (2,) about where corner 0 of the shape is in that frame, or, without a box, where it is when
-            the detector first sees the reference; None: no hint.
+        place: What the operator said of where it is.
         camera: Calibrated camera; its lens distortion is removed from edge points before lines are fitted.
 
-    Raises:
-        GroundError: The box, its time or the hint make no sense.
     """
 
     def __init__(
@@ -59,14 +53,12 @@ class ReferenceGround:
         shape: ReferenceShape,
         params: ReferenceParams | None = None,
         *,
-        box_xyxy_px: Sequence[float] | FloatArray | None = None,
-        box_time_s: float | None = None,
-        first_corner_px: Sequence[float] | FloatArray | None = None,
+        place: GivenPlace | None = None,
         camera: Camera | None = None,
     ) -> None:
         self._shape = shape
         self._params = params if params is not None else ReferenceParams()
-        self._given = GivenPlace(box_xyxy_px, box_time_s, first_corner_px)
+        self._given = place if place is not None else GivenPlace()
         self._given_camera = camera
         self._camera = camera
         self._size_px: tuple[int, int] | None = None
