@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-
 from drawn_ground import SIZE_PX, GrayPicture, lens, view
+
 from standoff.core import homography
 from standoff.core.camera import Camera
 from standoff.core.homography import FloatArray

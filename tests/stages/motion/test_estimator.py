@@ -1,12 +1,26 @@
 from __future__ import annotations
 
+from itertools import pairwise
+
 import cv2
 import numpy as np
 import pytest
 import tolerances
-from drawn_ground import SIZE_PX, lens
+from drawn_ground import SIZE_PX, lens, view
 from flown_ground import (
-    FPS, GROUND, LENS, NOTHING, OTHER_GROUND, error_px, flight, follow, frame, grid, moved, reason, seen,
+    FPS,
+    GROUND,
+    LENS,
+    NOTHING,
+    OTHER_GROUND,
+    error_px,
+    flight,
+    follow,
+    frame,
+    grid,
+    moved,
+    reason,
+    seen,
 )  # fmt: skip
 
 from standoff.core import homography
@@ -56,7 +70,7 @@ def flown() -> list[ImageArray]:
 def carried(motions: list[CameraMotion | NoCameraMotion], every: int = 1) -> tuple[FloatArray, int]:
     """Return the composed motion from the first to the last frame, and how many keyframes there were."""
     total, keys = np.eye(3), set()
-    for index, (before, now) in enumerate(zip(motions[:-1], motions[1:], strict=True)):
+    for index, (before, now) in enumerate(pairwise(motions)):
         step = picture_step(before, index * every / FPS, now)
         assert step is not None
         total = step @ total
@@ -80,7 +94,7 @@ def test_half_the_frames_tell_the_same_motion(flown: list[ImageArray]) -> None:
 
 def test_a_keyframe_is_always_a_frame_before(flown: list[ImageArray]) -> None:
     motions = [moved(motion) for motion in follow(flown[:80])]
-    for index, (before, now) in enumerate(zip(motions[:-1], motions[1:], strict=True)):
+    for index, (before, now) in enumerate(pairwise(motions)):
         assert now.keyframe_s in (before.keyframe_s, index / FPS)
 
 
@@ -165,14 +179,8 @@ def test_a_zoom_is_told_from_its_second_frame_on_and_followed_after_it() -> None
 
 
 def test_a_descent_is_no_zoom() -> None:
-    heights = [flight(0.0)] + [flight_from(13.0 - 0.2 * step) for step in range(1, 25)]
-    assert all(follow([seen(view, seed=index) for index, view in enumerate(heights)]))
-
-
-def flight_from(away_m: float) -> FloatArray:
-    from drawn_ground import view
-
-    return view(LENS, (0.0, 0.0), away_m, 30.0, 0.0)
+    heights = [flight(0.0)] + [view(LENS, (0.0, 0.0), 13.0 - 0.2 * step, 30.0, 0.0) for step in range(1, 25)]
+    assert all(follow([seen(height, seed=index) for index, height in enumerate(heights)]))
 
 
 def test_a_picture_that_is_shown_again_is_told_and_has_not_moved() -> None:

@@ -75,7 +75,7 @@ def fit_plane(
     Args:
         source: (N, 2), exact.
         target: (N, 2) with errors, some of them large.
-        trusted: (N,) the points among which the consensus is sought, where they are enough; all take part after that.
+        trusted: (N,) the points among which consensus is sought, where they are enough; all take part after that.
         inlier_px: How far a point of the plane may be off.
         followed_px: Size of one pixel of the picture in which the points were followed.
 
