@@ -130,10 +130,10 @@ def test_a_lorry_that_fills_half_the_picture_does_not_carry_the_ground_along() -
         left, width = 20 + 5 * index, 240
         box = np.array([[left, 0.0, left + width, SIZE_PX[1]]])
         truck = Detections(box, np.array([0.9]), np.array([TRUCK]))
-        view = shifted(-2.0 * index)
-        motion = moved(estimator.update(frame(block(seen(view, seed=index), left, width), index), truck))
+        now = shifted(-2.0 * index)
+        motion = moved(estimator.update(frame(block(seen(now, seed=index), left, width), index), truck))
         key = shifted(-2.0 * round(motion.keyframe_s * FPS))
-        assert lengths(error_px(motion.keyframe_to_image, key, view)).max() < tolerances.HALF_SEEN_PX
+        assert lengths(error_px(motion.keyframe_to_image, key, now)).max() < tolerances.HALF_SEEN_PX
 
 
 def test_the_last_boxes_are_left_out_while_the_detector_rests() -> None:
@@ -230,8 +230,8 @@ def test_the_lens_is_removed_where_it_is_known() -> None:
     maps = ideal.reshape(SIZE_PX[1], SIZE_PX[0], 2).astype(np.float32)
     views = [flight(0.04 * index) for index in range(10)]
     estimator = MotionEstimator(camera=wide)
-    for index, view in enumerate(views):
-        picture = cv2.remap(seen(view, seed=index), maps[..., 0], maps[..., 1], cv2.INTER_LINEAR)
+    for index, ground_to_image in enumerate(views):
+        picture = cv2.remap(seen(ground_to_image, seed=index), maps[..., 0], maps[..., 1], cv2.INTER_LINEAR)
         motion = moved(estimator.update(frame(picture, index), NOTHING))
     assert motion.camera is not None and motion.camera.distortion[0] == -0.15
     assert lengths(error_px(motion.keyframe_to_image, views[0], views[-1])).max() < tolerances.FOLLOWED_PX
