@@ -98,8 +98,10 @@ def run(
     ] = None,
     ground: Annotated[
         str | None,
-        typer.Option(help="square:SIDE or rectangle:LENGTH,WIDTH (a reference object, m; ,height=H where its top is so high "
-            "above the ground), survey.yaml (surveyed points), or none."),
+        typer.Option(
+            help="square:SIDE or rectangle:LENGTH,WIDTH (a reference object, m; ,height=H where its top is so high "
+            "above the ground), survey.yaml (surveyed points), or none."
+        ),
     ] = None,
     reference_box: Annotated[
         str | None, typer.Option(help="Box of the reference in the first frame: left,top,right,bottom px.")

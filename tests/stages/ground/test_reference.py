@@ -7,7 +7,6 @@ import pytest
 from drawn_ground import box_around, frame, lens, picture, view
 from tolerances import REFERENCE_GROUND_REL
 
-from standoff.stages.ground.where import NOT_SEEN, NOT_YET, GivenPlace
 from standoff.core import homography
 from standoff.core.camera import Camera
 from standoff.core.classes import CLASS_BY_NAME
@@ -17,6 +16,7 @@ from standoff.core.types import Detections, GroundMap, ImageArray, NoCameraMotio
 from standoff.stages.ground import ReferenceGround, ReferenceParams, ReferenceShape
 from standoff.stages.ground.params import ReferenceMethod
 from standoff.stages.ground.reference import AMBIGUOUS, IMPLAUSIBLE, LOST
+from standoff.stages.ground.where import NOT_SEEN, NOT_YET, GivenPlace
 
 METHODS: tuple[ReferenceMethod, ...] = ("paper", "paper+tls", "oriented")
 FOOTING = ReferenceShape.square(2.89)
@@ -71,7 +71,9 @@ def length_errors(ground: GroundMap, ground_to_image: FloatArray, shape: Referen
 @pytest.mark.parametrize("shape", [FOOTING, QUADRILATERAL])
 def test_metres_are_recovered_around_the_reference(shape: ReferenceShape, yaw_deg: float) -> None:
     gray, ground_to_image, box = seen(shape, yaw_deg=yaw_deg)
-    ground = mapped(ReferenceGround(shape, place=GivenPlace(box_xyxy_px=box), camera=LENS).update(frame(gray), NOTHING, STILL))
+    ground = mapped(
+        ReferenceGround(shape, place=GivenPlace(box_xyxy_px=box), camera=LENS).update(frame(gray), NOTHING, STILL)
+    )
     assert np.abs(length_errors(ground, ground_to_image, shape)).max() < REFERENCE_GROUND_REL
     assert ground.method == "reference:oriented"
 
@@ -80,7 +82,9 @@ def test_metres_are_recovered_around_the_reference(shape: ReferenceShape, yaw_de
 def test_every_method_maps_the_footing_of_the_paper(method: ReferenceMethod) -> None:
     gray, ground_to_image, box = seen(FOOTING)
     ground = mapped(
-        ReferenceGround(FOOTING, ReferenceParams(method=method), place=GivenPlace(box_xyxy_px=box)).update(frame(gray), NOTHING, STILL)
+        ReferenceGround(FOOTING, ReferenceParams(method=method), place=GivenPlace(box_xyxy_px=box)).update(
+            frame(gray), NOTHING, STILL
+        )
     )
     limit = REFERENCE_GROUND_REL * (10.0 if method == "paper" else 2.0)
     assert np.abs(length_errors(ground, ground_to_image, FOOTING)).max() < limit
@@ -89,7 +93,11 @@ def test_every_method_maps_the_footing_of_the_paper(method: ReferenceMethod) -> 
 
 def test_corners_of_an_uneven_shape_get_their_own_coordinates() -> None:
     gray, ground_to_image, box = seen(QUADRILATERAL, yaw_deg=200.0)
-    ground = mapped(ReferenceGround(QUADRILATERAL, place=GivenPlace(box_xyxy_px=box), camera=LENS).update(frame(gray), NOTHING, STILL))
+    ground = mapped(
+        ReferenceGround(QUADRILATERAL, place=GivenPlace(box_xyxy_px=box), camera=LENS).update(
+            frame(gray), NOTHING, STILL
+        )
+    )
     found, _ = ground.to_ground(homography.apply(ground_to_image, QUADRILATERAL.corners_m)[0])
     np.testing.assert_allclose(found, QUADRILATERAL.corners_m, atol=0.02)
 
@@ -97,7 +105,9 @@ def test_corners_of_an_uneven_shape_get_their_own_coordinates() -> None:
 def test_the_distortion_of_a_wide_lens_is_removed() -> None:
     shape = ReferenceShape.square(6.0)
     gray, ground_to_image, box = seen(shape, camera=WIDE)
-    with_camera = mapped(ReferenceGround(shape, place=GivenPlace(box_xyxy_px=box), camera=WIDE).update(frame(gray), NOTHING, STILL))
+    with_camera = mapped(
+        ReferenceGround(shape, place=GivenPlace(box_xyxy_px=box), camera=WIDE).update(frame(gray), NOTHING, STILL)
+    )
     assert np.abs(length_errors(with_camera, ground_to_image, shape)).max() < REFERENCE_GROUND_REL
     true_px = WIDE.distort(homography.apply(ground_to_image, shape.corners_m)[0])
     off = np.linalg.norm(with_camera.anchors_px[:, None] - true_px[None], axis=2).min(axis=1)
@@ -129,7 +139,9 @@ def flight(count: int, yaw_step_deg: float) -> list[tuple[ImageArray, FloatArray
 
 def test_the_site_frame_stays_while_the_drone_turns_around_and_only_the_first_box_is_given() -> None:
     frames = flight(25, 5.0)
-    stage = ReferenceGround(FOOTING, place=GivenPlace(box_xyxy_px=box_around(frames[0][1], FOOTING.corners_m, LENS)), camera=LENS)
+    stage = ReferenceGround(
+        FOOTING, place=GivenPlace(box_xyxy_px=box_around(frames[0][1], FOOTING.corners_m, LENS)), camera=LENS
+    )
     first = None
     post = np.array([[4.0, 3.0]])
     for k, (gray, ground_to_image) in enumerate(frames):
@@ -219,7 +231,9 @@ def test_a_hint_is_a_place_in_the_picture_as_the_lens_shows_it() -> None:
     gray, ground_to_image, box = seen(shape, camera=WIDE)
     corners_px = WIDE.distort(homography.apply(ground_to_image, shape.corners_m)[0])
     for corner in range(4):
-        stage = ReferenceGround(shape, place=GivenPlace(box_xyxy_px=box, first_corner_px=corners_px[corner]), camera=WIDE)
+        stage = ReferenceGround(
+            shape, place=GivenPlace(box_xyxy_px=box, first_corner_px=corners_px[corner]), camera=WIDE
+        )
         ground = mapped(stage.update(frame(gray), NOTHING, STILL))
         np.testing.assert_allclose(ground.anchors_px[0], corners_px[corner], atol=0.3)
 
@@ -228,7 +242,10 @@ def test_a_shape_whose_corners_cannot_be_told_apart_is_not_guessed_at() -> None:
     shape = ReferenceShape.rectangle(2.8, 2.9)
     gray, ground_to_image, box = seen(shape)
     assert shape.turns_onto_itself() == (0, 2)
-    assert reason(ReferenceGround(shape, place=GivenPlace(box_xyxy_px=box)).update(frame(gray), NOTHING, STILL)) == AMBIGUOUS
+    assert (
+        reason(ReferenceGround(shape, place=GivenPlace(box_xyxy_px=box)).update(frame(gray), NOTHING, STILL))
+        == AMBIGUOUS
+    )
     for corner in range(4):
         hint = homography.apply(ground_to_image, shape.corners_m)[0][corner] + 4.0
         stage = ReferenceGround(shape, place=GivenPlace(box_xyxy_px=box, first_corner_px=hint))
@@ -280,7 +297,9 @@ def test_a_box_or_camera_that_does_not_fit_the_pictures_is_refused() -> None:
         ReferenceGround(FOOTING, place=GivenPlace(box_xyxy_px=box + 1000.0)).update(frame(gray), NOTHING, STILL)
     square_camera = Camera(400, 400, LENS.matrix, LENS.distortion)
     with pytest.raises(GroundError, match="400x400"):
-        ReferenceGround(FOOTING, place=GivenPlace(box_xyxy_px=box), camera=square_camera).update(frame(gray), NOTHING, STILL)
+        ReferenceGround(FOOTING, place=GivenPlace(box_xyxy_px=box), camera=square_camera).update(
+            frame(gray), NOTHING, STILL
+        )
 
 
 def test_a_hint_goes_with_the_first_detection_too() -> None:
@@ -310,7 +329,9 @@ def test_eq_6_scale_is_metres_per_pixel_of_the_reference() -> None:
 
 
 def test_the_description_is_plain_and_says_what_was_configured() -> None:
-    stage = ReferenceGround(FOOTING, ReferenceParams(method="paper"), place=GivenPlace(box_xyxy_px=(1, 2, 30, 40), first_corner_px=(2, 3)))
+    stage = ReferenceGround(
+        FOOTING, ReferenceParams(method="paper"), place=GivenPlace(box_xyxy_px=(1, 2, 30, 40), first_corner_px=(2, 3))
+    )
     record = json.loads(json.dumps(stage.description))
     assert record["params"]["method"] == "paper"
     assert record["box_xyxy_px"] == [1, 2, 30, 40]

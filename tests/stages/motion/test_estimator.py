@@ -1,10 +1,12 @@
 from __future__ import annotations
 
+from itertools import pairwise
+
 import cv2
 import numpy as np
 import pytest
 import tolerances
-from drawn_ground import SIZE_PX, lens
+from drawn_ground import SIZE_PX, lens, view
 from flown_ground import (
     FPS,
     GROUND,
@@ -68,7 +70,7 @@ def flown() -> list[ImageArray]:
 def carried(motions: list[CameraMotion | NoCameraMotion], every: int = 1) -> tuple[FloatArray, int]:
     """Return the composed motion from the first to the last frame, and how many keyframes there were."""
     total, keys = np.eye(3), set()
-    for index, (before, now) in enumerate(zip(motions[:-1], motions[1:], strict=True)):
+    for index, (before, now) in enumerate(pairwise(motions)):
         step = picture_step(before, index * every / FPS, now)
         assert step is not None
         total = step @ total
@@ -92,7 +94,7 @@ def test_half_the_frames_tell_the_same_motion(flown: list[ImageArray]) -> None:
 
 def test_a_keyframe_is_always_a_frame_before(flown: list[ImageArray]) -> None:
     motions = [moved(motion) for motion in follow(flown[:80])]
-    for index, (before, now) in enumerate(zip(motions[:-1], motions[1:], strict=True)):
+    for index, (before, now) in enumerate(pairwise(motions)):
         assert now.keyframe_s in (before.keyframe_s, index / FPS)
 
 
@@ -128,10 +130,10 @@ def test_a_lorry_that_fills_half_the_picture_does_not_carry_the_ground_along() -
         left, width = 20 + 5 * index, 240
         box = np.array([[left, 0.0, left + width, SIZE_PX[1]]])
         truck = Detections(box, np.array([0.9]), np.array([TRUCK]))
-        view = shifted(-2.0 * index)
-        motion = moved(estimator.update(frame(block(seen(view, seed=index), left, width), index), truck))
+        now = shifted(-2.0 * index)
+        motion = moved(estimator.update(frame(block(seen(now, seed=index), left, width), index), truck))
         key = shifted(-2.0 * round(motion.keyframe_s * FPS))
-        assert lengths(error_px(motion.keyframe_to_image, key, view)).max() < tolerances.HALF_SEEN_PX
+        assert lengths(error_px(motion.keyframe_to_image, key, now)).max() < tolerances.HALF_SEEN_PX
 
 
 def test_the_last_boxes_are_left_out_while_the_detector_rests() -> None:
@@ -177,14 +179,8 @@ def test_a_zoom_is_told_from_its_second_frame_on_and_followed_after_it() -> None
 
 
 def test_a_descent_is_no_zoom() -> None:
-    heights = [flight(0.0)] + [flight_from(13.0 - 0.2 * step) for step in range(1, 25)]
-    assert all(follow([seen(view, seed=index) for index, view in enumerate(heights)]))
-
-
-def flight_from(away_m: float) -> FloatArray:
-    from drawn_ground import view
-
-    return view(LENS, (0.0, 0.0), away_m, 30.0, 0.0)
+    heights = [flight(0.0)] + [view(LENS, (0.0, 0.0), 13.0 - 0.2 * step, 30.0, 0.0) for step in range(1, 25)]
+    assert all(follow([seen(height, seed=index) for index, height in enumerate(heights)]))
 
 
 def test_a_picture_that_is_shown_again_is_told_and_has_not_moved() -> None:
@@ -234,8 +230,8 @@ def test_the_lens_is_removed_where_it_is_known() -> None:
     maps = ideal.reshape(SIZE_PX[1], SIZE_PX[0], 2).astype(np.float32)
     views = [flight(0.04 * index) for index in range(10)]
     estimator = MotionEstimator(camera=wide)
-    for index, view in enumerate(views):
-        picture = cv2.remap(seen(view, seed=index), maps[..., 0], maps[..., 1], cv2.INTER_LINEAR)
+    for index, ground_to_image in enumerate(views):
+        picture = cv2.remap(seen(ground_to_image, seed=index), maps[..., 0], maps[..., 1], cv2.INTER_LINEAR)
         motion = moved(estimator.update(frame(picture, index), NOTHING))
     assert motion.camera is not None and motion.camera.distortion[0] == -0.15
     assert lengths(error_px(motion.keyframe_to_image, views[0], views[-1])).max() < tolerances.FOLLOWED_PX

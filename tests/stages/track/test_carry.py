@@ -84,7 +84,8 @@ def test_boxes_coast_over_the_ground_and_not_over_the_picture(camera: Camera | N
 
 def test_a_motion_after_a_loss_is_not_applied_to_frames_that_it_does_not_span() -> None:
     plain, tracker = Tracker(), Tracker()
-    for index, step in enumerate([UNKNOWN, UNKNOWN, motion(2), UNKNOWN]):
+    motions: list[CameraMotion | NoCameraMotion] = [UNKNOWN, UNKNOWN, motion(2), UNKNOWN]
+    for index, step in enumerate(motions):
         first = plain.update(index / FPS, boxes(0.0), UNKNOWN)
         second = tracker.update(index / FPS, boxes(0.0), step)
         assert (first.xyxy_px == second.xyxy_px).all()

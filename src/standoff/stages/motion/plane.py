@@ -69,13 +69,13 @@ def fit_plane(
 ) -> PlaneMotion | None:
     """Fit the homography that most point pairs share.
 
-    Consensus by RANSAC or MAGSAC, then reweighted least squares of the distances in the target with Tukey's weights, at the
-    scale of the residuals themselves.
+    Consensus by RANSAC or MAGSAC, then reweighted least squares of the distances in the target, with Tukey's weights at
+    the scale of the residuals themselves.
 
     Args:
         source: (N, 2), exact.
         target: (N, 2) with errors, some of them large.
-        trusted: (N,) the points among which the consensus is sought, where they are enough; all take part after that.
+        trusted: (N,) the points among which consensus is sought, where they are enough; all take part after that.
         inlier_px: How far a point of the plane may be off.
         followed_px: Size of one pixel of the picture in which the points were followed.
 
@@ -233,7 +233,7 @@ class _Refinement:
             return None
         residual, jacobian = now.residual[:, inlier], now.jacobian[:, inlier]
         rows = jacobian.reshape(-1, _PARAMETERS)
-        parameters: FloatArray = np.linalg.inv(rows.T @ rows)
+        parameters = np.asarray(np.linalg.inv(rows.T @ rows), dtype=np.float64)
         variance = max(float((residual**2).sum()) / max(residual.size - _PARAMETERS, 1), self._floor**2)
         block = _blocks(self._source[:, :2])[inlier]
         covariance = np.zeros((9, 9))
