@@ -19,7 +19,7 @@ from standoff.stages.ground.pose_map import map_from_view
 from standoff.stages.ground.reference import rectified_scale_m_per_px
 from standoff.stages.ground.shape import ReferenceShape
 from standoff.stages.ground.solid import HEIGHT, SolidState
-from standoff.stages.ground.solid_fit import SolidFit, fit_solid
+from standoff.stages.ground.solid_fit import fit_solid
 from standoff.stages.ground.solid_search import Found, HeightPrior, search_solid
 from standoff.stages.ground.turned import turned_like
 from standoff.stages.ground.where import NOT_SEEN, GivenPlace, detected_box
@@ -164,7 +164,7 @@ class FusedGround:
             return False
         reach_px = float(np.clip(_REACH_SIGMAS * sigma_px + 1.0, _LEAST_REACH_PX, _MOST_REACH_PX))
         fit = fit_solid(gray, self._shape, now.belief(), reach_px)
-        if fit is None or seen_share(fit, len(self._shape.corners_m)) < _MIN_SUPPORT:
+        if fit is None or fit.seen_share(len(self._shape.corners_m)) < _MIN_SUPPORT:
             return False
         moved_px = np.linalg.norm(self._outline_px(fit.state) - self._outline_px(now.state), axis=1)
         if not moved_px.max() <= _GATE_PX + _GATE_SIGMAS * sigma_px:
@@ -277,15 +277,6 @@ class FusedGround:
             size_sigma=self._params.size_sigma,
             middle_m=self._shape.corners_m.mean(axis=0),
         )
-
-
-def seen_share(fit: SolidFit, sides: int) -> float:
-    """Return the share of the outline's sides that the picture has, of their upper or of their lower edges."""
-    upper = np.nan_to_num(fit.support[:sides], nan=0.0)
-    lower = np.flatnonzero(fit.lower_side >= 0)
-    np.maximum.at(upper, fit.lower_side[lower], np.nan_to_num(fit.support[lower], nan=0.0))
-    length = fit.length_px[:sides]
-    return float(upper @ length / length.sum()) if length.sum() > 0 else 0.0
 
 
 def _scale(state: SolidState) -> float:

@@ -164,15 +164,18 @@ def sample_edges(shape: ReferenceShape, state: SolidState) -> EdgeSamples:
         edge=edge,
         points_px=state.view.project(places * scale),
         normal=normal[edge],
-        reach_px=_free_reach(ends_px, normal)[edge],
+        reach_px=_free_reach(ends_px, normal, edges[:, 0, 2] == edges[:, 1, 2])[edge],
         length_px=np.where(usable, length_px, 0.0),
         doubt_px=doubt_px,
         lower_side=lower_side,
     )
 
 
-def _free_reach(ends_px: FloatArray, normal: FloatArray) -> FloatArray:
-    """Return (E,) half the distance from each edge to the nearest one that runs beside it, in px; inf if none does."""
+def _free_reach(ends_px: FloatArray, normal: FloatArray, level: BoolArray) -> FloatArray:
+    """Return (E,) half the distance from each edge to the nearest level one that runs beside it, in px; inf if none does.
+
+    Upright edges are too short to hem in others.
+    """
     middle = ends_px.mean(axis=1)
     along = ends_px[:, 1] - ends_px[:, 0]
     length = np.linalg.norm(along, axis=1)
@@ -183,7 +186,7 @@ def _free_reach(ends_px: FloatArray, normal: FloatArray) -> FloatArray:
         lengthwise = np.abs((apart * (along / length[:, None])[:, None]).sum(axis=2))
         # Edges that follow each other in one line do not hem each other in.
         beside = lengthwise < _OVERLAP * (length[None] + length[:, None]) / 2.0
-    across[~(parallel & beside)] = np.inf
+    across[~(parallel & beside & level)] = np.inf
     np.fill_diagonal(across, np.inf)
     reach: FloatArray = across.min(axis=1) / 2.0
     return reach

@@ -24,7 +24,10 @@ _CORRELATED = 6.0
 _EDGE_SIGMA_PX = 0.12
 """No edge is known better than this, whatever its samples' scatter: lens blur, shading and compression pull it."""
 
-_WORTH_SETTLING_PX, _DOUBT_LEFT = 0.2, 0.3
+_PATCHY_PX = 2.0
+"""An edge of which hardly anything agrees may be something else's, off by about so much; one that is whole is not."""
+
+_WORTH_SETTLING_PX, _DOUBT_LEFT = 0.2, 0.5
 """A narrow side's doubt of less than this is not worth a decision, and after one so much of it remains."""
 
 _LEAST_SHARE = 0.35
@@ -69,12 +72,17 @@ class SolidFit:
     lower_side: IntArray
     scatter_px: float
 
-    @property
-    def supported_share(self) -> float:
-        """The share of all visible outline that the picture supports; 0 where nothing could be looked at."""
-        known = np.isfinite(self.support)
-        length = self.length_px[known].sum()
-        return float((self.support[known] * self.length_px[known]).sum() / length) if length > 0 else 0.0
+    def side_support(self, count: int) -> FloatArray:
+        """Return (count,) the share of each side's upper or lower edge, the better one, that the picture has."""
+        upper = np.nan_to_num(self.support[:count], nan=0.0)
+        lower = np.flatnonzero(self.lower_side >= 0)
+        np.maximum.at(upper, self.lower_side[lower], np.nan_to_num(self.support[lower], nan=0.0))
+        return upper
+
+    def seen_share(self, count: int) -> float:
+        """Return the share of the whole outline, of `count` sides, that the picture has."""
+        length = self.length_px[:count]
+        return float(self.side_support(count) @ length / length.sum()) if length.sum() > 0 else 0.0
 
 
 def fit_solid(
@@ -175,7 +183,9 @@ def _normal_equations(
     np.add.at(shared, samples.edge, rows * root[:, None])
     np.add.at(pulls, samples.edge, values * root)
     np.add.at(total, samples.edge, root**2)
-    shrink = 1.0 / (1.0 / (_EDGE_SIGMA_PX**2 + samples.doubt_px**2) + total)
+    agreeing = np.bincount(samples.edge, weight > 0, count) / np.maximum(np.bincount(samples.edge, minlength=count), 1)
+    patchy_px = _PATCHY_PX * (1.0 - agreeing) ** 2
+    shrink = 1.0 / (1.0 / (_EDGE_SIGMA_PX**2 + samples.doubt_px**2 + patchy_px**2) + total)
     information: FloatArray = rows.T @ rows - (shared * shrink[:, None]).T @ shared
     pull: FloatArray = rows.T @ values - shared.T @ (shrink * pulls)
     return information, pull

@@ -44,8 +44,10 @@ _BARE_COST, _ROLL_COST, _PATCHY = 0.45, 0.1, 0.33
 _REFINED = 4
 _FIT_PX = 4.0
 _RIVAL_SCORE, _RIVAL_PX = 0.9, 4.0
-_MIN_SIDE_SUPPORT = 0.5
-"""So much of every side must be seen when nothing else says that the reference is there."""
+_MIN_SIDE_SUPPORT, _MIN_MEAN_SUPPORT, _MIN_OTHER_SUPPORT = 0.5, 0.75, 0.85
+"""So much of the sides must be seen when nothing else says that the reference is there."""
+
+_SMOOTHINGS_PX = (0.0, 2.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,36 +110,78 @@ def search_solid(
     """
     margin = _MARGIN * float((box_xyxy_px[2:] - box_xyxy_px[:2]).max())
     box = box_xyxy_px + np.array([-margin, -margin, margin, margin])
-    gradients = sobel_gradients(gray, box)
     picture = Blurred.around(gray, box.reshape(2, 2), margin)
-    if gradients is None or picture is None:
+    if picture is None:
         return NoGroundMap(BOX_OUTSIDE)
-    edges = between_pixels(canny(gradients, *noise_thresholds(gradients)), gradients).undistorted(camera.camera)
-    if len(edges) < _MIN_EDGES:
-        return NoGroundMap(TOO_FEW_EDGES)
-    outlines = likely_quadrilaterals(edges, undistorted_box(box, camera.camera), _QUADRILATERALS)
+    found: Found | NoGroundMap = NoGroundMap(NOT_THERE)
+    for smoothing_px in _SMOOTHINGS_PX:
+        found = _search(gray, picture, box, shape, camera, height, smoothing_px)
+        if isinstance(found, Found):
+            break
+    return found
+
+
+def _search(
+    gray: ImageArray,
+    picture: Blurred,
+    box: FloatArray,
+    shape: ReferenceShape,
+    camera: CameraPrior,
+    height: HeightPrior,
+    smoothing_px: float,
+) -> Found | NoGroundMap:
+    outlines = _outlines(gray, box, camera.camera, smoothing_px)
+    if isinstance(outlines, NoGroundMap):
+        return outlines
     states = [state for outline in outlines for state in _states(outline, shape, camera.camera, height)]
     if not states:
         return NoGroundMap(NO_QUADRILATERAL)
     scores = np.array([_score(picture, shape, state, box) for state in states])
-    ranking = np.argsort(-scores, kind="stable")[: _REFINED * len(height.tried_m)]
     fits: list[tuple[float, Found]] = []
-    for k in ranking:
-        if scores[k] <= 0 or len(fits) == _REFINED:
+    for k in np.argsort(-scores, kind="stable")[: _REFINED * len(height.tried_m)]:
+        if len(fits) == _REFINED:
             break
         prior = _prior(states[k], camera, height)
         fit = fit_solid(gray, shape, prior, _FIT_PX, start=states[k])
         if fit is not None and _believable(fit, shape):
-            fits.append((_score(picture, shape, fit.state, box), Found(fit, prior)))
+            score = _score(picture, shape, fit.state, box)
+            if score > 0:
+                fits.append((score, Found(fit, prior)))
     return _best(fits, shape)
 
 
+def _outlines(gray: ImageArray, box: FloatArray, camera: Camera, smoothing_px: float) -> FloatArray | NoGroundMap:
+    """Return (Q, 4, 2) quadrilaterals in a box; smoothing finds faint edges in noise, and loses fine ones."""
+    if smoothing_px > 0:
+        gray = _smoothed_in(gray, box, smoothing_px)
+    gradients = sobel_gradients(gray, box)
+    if gradients is None:
+        return NoGroundMap(BOX_OUTSIDE)
+    edges = between_pixels(canny(gradients, *noise_thresholds(gradients)), gradients).undistorted(camera)
+    if len(edges) < _MIN_EDGES:
+        return NoGroundMap(TOO_FEW_EDGES)
+    return likely_quadrilaterals(edges, undistorted_box(box, camera), _QUADRILATERALS)
+
+
+def _smoothed_in(gray: ImageArray, box: FloatArray, smoothing_px: float) -> ImageArray:
+    """Return the picture, smoothed in and around a box."""
+    margin = int(4 * smoothing_px) + 8
+    height, width = gray.shape
+    left, top = np.maximum(np.floor(box[:2]).astype(int) - margin, 0)
+    right, bottom = np.minimum(np.ceil(box[2:]).astype(int) + margin, (width, height))
+    smooth = gray.copy()
+    smooth[top:bottom, left:right] = cv2.GaussianBlur(gray[top:bottom, left:right], (0, 0), smoothing_px)
+    return smooth
+
+
 def _believable(fit: SolidFit, shape: ReferenceShape) -> bool:
-    """Return whether the picture has enough of every side, of its upper or of its lower edge."""
-    sides = np.nan_to_num(fit.support[: len(shape.corners_m)], nan=0.0)
-    faces = np.flatnonzero(fit.lower_side >= 0)
-    np.maximum.at(sides, fit.lower_side[faces], np.nan_to_num(fit.support[faces], nan=0.0))
-    return bool(sides.min() >= _MIN_SIDE_SUPPORT)
+    """Return whether the picture has enough of the sides: of every one, or of all but one and of the solid below."""
+    count = len(shape.corners_m)
+    sides = np.sort(fit.side_support(count))
+    if sides[0] >= _MIN_SIDE_SUPPORT and sides.mean() >= _MIN_MEAN_SUPPORT:
+        return True
+    lower = fit.support[(fit.lower_side >= 0) & np.isfinite(fit.support)]
+    return bool(sides[1] >= _MIN_OTHER_SUPPORT and len(lower) and lower.max() >= _MIN_OTHER_SUPPORT)
 
 
 def _best(fits: list[tuple[float, Found]], shape: ReferenceShape) -> Found | NoGroundMap:
