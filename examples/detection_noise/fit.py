@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 from collections import defaultdict
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -132,7 +133,7 @@ def fit_edges(edges: FloatArray, sides: FloatArray) -> tuple[FloatArray, float, 
 
 
 def fit_scores(features: FloatArray, logits: FloatArray) -> tuple[FloatArray, float]:
-    """Return the coefficients of the scores' log odds, slopes pulled a little to zero, and the deviation around them."""
+    """Return the coefficients of the scores' log odds, slopes pulled to zero a little, and their deviation."""
     pull = np.diag([0.0, 1.0, 1.0]) * PRIOR * len(logits) ** 0.5
     weights = np.linalg.solve(features.T @ features + pull, features.T @ logits)
     return weights, float(np.std(logits - features @ weights))
@@ -142,7 +143,7 @@ def memory_s(tracks: Tracks) -> float:
     """Return the time after which the correlation of one entity's edge errors falls to 1/e."""
     first, second, gaps = [], [], []
     for track in tracks.values():
-        for (start_s, one), (stop_s, other) in zip(track, track[1:], strict=False):
+        for (start_s, one), (stop_s, other) in pairwise(track):
             first.append(one)
             second.append(other)
             gaps.append(stop_s - start_s)
