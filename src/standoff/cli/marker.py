@@ -10,7 +10,8 @@ import typer
 
 def marker(
     size_m: Annotated[
-        float, typer.Option(help="Side of the black square, outer edge to outer edge; m (0.1 to 3.5).", show_default=False)
+        float,
+        typer.Option(help="Side of the black square, outer edge to outer edge; m (0.1 to 3.5).", show_default=False),
     ],
     out: Annotated[Path, typer.Option("--out", "-o", help="PDF to write.", show_default=False)],
     marker_id: Annotated[int, typer.Option("--id", help="Which marker of the family.")] = 0,

@@ -33,6 +33,23 @@ def _numbers(text: str, count: int, option: str) -> tuple[float, ...]:
     return numbers
 
 
+def _marker_override(text: str) -> dict[str, Any]:
+    """Read `marker:SIZE` or `marker:SIZE,id=ID` into settings of the only marker, which defines the site frame."""
+    size, *words = text.removeprefix("marker:").split(",")
+    size_m = _numbers(size, 1, "--ground marker:SIZE")[0]
+    marker: dict[str, Any] = {"size_m": size_m}
+    for word in words:
+        name, _, value = word.strip().partition("=")
+        if name != "id" or not value.isdecimal() or len(words) > 1:
+            raise ConfigError(
+                expected="--ground marker:SIZE or marker:SIZE,id=ID",
+                found=repr(text),
+                fix="write for example marker:1.2,id=3",
+            )
+        marker["id"] = int(value)
+    return {"markers": [marker], "survey": None, "reference": None}
+
+
 def _ground_overrides(ground: str | None, box: str | None, camera: Path | None) -> dict[str, Any]:
     """Translate `--ground`, `--reference-box` and `--camera` into settings."""
     overrides: dict[str, Any] = {}
@@ -42,10 +59,15 @@ def _ground_overrides(ground: str | None, box: str | None, camera: Path | None) 
         side_m = _numbers(ground.removeprefix("square:"), 1, "--ground square:SIDE")[0]
         overrides["reference"] = {"square_m": side_m, **others}
         overrides["survey"] = None
+    elif ground is not None and ground.startswith("marker:"):
+        overrides |= _marker_override(ground)
     elif ground == "none":
         overrides |= {"survey": None, "reference": None}
     elif ground is not None:
         overrides |= {"survey": ground, "reference": None}
+    if ground is not None:
+        # What the command line names is the ground; the file's markers may lie in another frame.
+        overrides.setdefault("markers", [])
     if box is not None:
         overrides.setdefault("reference", {})
         if overrides["reference"] is None:
@@ -67,7 +89,10 @@ def run(
     model: Annotated[str | None, typer.Option(help="Detector: site (ours, the default), or an ONNX file.")] = None,
     ground: Annotated[
         str | None,
-        typer.Option(help="survey.yaml (surveyed points), square:SIDE (a square reference, side in m), or none."),
+        typer.Option(
+            help="survey.yaml (surveyed points), square:SIDE (a square reference, side in m), "
+            "marker:SIZE[,id=ID] (a printed marker, black square in m), or none."
+        ),
     ] = None,
     reference_box: Annotated[
         str | None, typer.Option(help="Box of the reference in the first frame: left,top,right,bottom px.")

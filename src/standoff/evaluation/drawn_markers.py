@@ -24,8 +24,7 @@ _SHEET_MODULES = 1.25
 _UNIT = np.array([[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]])
 _WHITE, _BLACK = 0.75, 0.04
 
-TILE_PX = 160
-"""Each marker gets a square of ground of its own, that wide."""
+_TILE_LEAST_PX, _TILE_SIDES, _TILE_ROOM_PX = 128, 2.2, 24
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +115,7 @@ def random_ground(rng: np.random.Generator, shape: tuple[int, int]) -> FloatArra
     for sigma_px, strength in ((1.0, 0.25), (3.0, 0.2), (10.0, 0.2)):
         grain = cv2.GaussianBlur(rng.standard_normal(shape), (0, 0), sigma_px)
         ground *= np.exp(strength * grain / grain.std())
-    return np.clip(ground, 0.02, 0.7)
+    return np.asarray(np.clip(ground, 0.02, 0.7))
 
 
 def through_camera(light: FloatArray, hardship: Hardship, rng: np.random.Generator) -> ImageArray:
@@ -176,11 +175,13 @@ def marker_film(
         (H, W) uint8, and (N, 4, 2) true corners.
     """
     across = int(np.ceil(np.sqrt(len(patterns))))
-    middles = np.array([[i % across + 0.5, i // across + 0.5] for i in range(len(patterns))]) * TILE_PX
+    # A sheet turned by 45 degrees and seen at a slant needs twice its side, and some room to drift.
+    tile_px = 2 * round(max(_TILE_LEAST_PX, _TILE_SIDES * side_px + _TILE_ROOM_PX) / 2)
+    middles = np.array([[i % across + 0.5, i // across + 0.5] for i in range(len(patterns))]) * tile_px
     start = np.stack([random_corners(rng, side_px) for _ in patterns]) + middles[:, None]
     start += rng.uniform(-8.0, 8.0, (len(patterns), 1, 2))
     drift = rng.uniform(-2.5, 2.5, 2)
-    ground = random_ground(rng, (across * TILE_PX, across * TILE_PX))
+    ground = random_ground(rng, (across * tile_px, across * tile_px))
     pictures = []
     for index in range(frames if hardship.crf is not None else 1):
         moved = index * drift

@@ -31,14 +31,18 @@ def assembly_page(target: Target, pieces: tuple[Tile, ...], paper: Paper) -> Fig
     top = height - _BORDER_MM
     title = f"standoff target: {target.family}, id {target.marker_id}"
     axes.text(_BORDER_MM, top, title, fontsize=points(6.0 * unit), color=INK, va="top", weight="bold")
-    axes.text(_BORDER_MM, top - 9.0 * unit, _summary(target, pieces, paper), fontsize=points(3.6 * unit), color=NOTE, va="top")
+    axes.text(
+        _BORDER_MM, top - 9.0 * unit, _summary(target, pieces, paper), fontsize=points(3.6 * unit), color=NOTE, va="top"
+    )
     sketch = min(_SKETCH_SHARE * width, 0.46 * height)
     corner = ((width - sketch) / 2.0, top - 26.0 * unit - sketch)
     _draw_sketch(axes, target, pieces, corner, sketch)
     below = corner[1] - 16.0 * unit
     for number, step in enumerate(_steps(target), start=1):
         axes.text(_BORDER_MM, below, f"{number}.", fontsize=points(3.4 * unit), color=INK, va="top", weight="bold")
-        axes.text(_BORDER_MM + 7.0 * unit, below, step, fontsize=points(3.4 * unit), color=NOTE, va="top", linespacing=1.3)
+        axes.text(
+            _BORDER_MM + 7.0 * unit, below, step, fontsize=points(3.4 * unit), color=NOTE, va="top", linespacing=1.3
+        )
         below -= (4.6 * unit) * (step.count("\n") + 1) + 1.6 * unit
     draw_bar(axes, _BORDER_MM, 9.0, "this bar is exactly 10 cm", 3.2)
     return figure
@@ -54,16 +58,16 @@ def _summary(target: Target, pieces: tuple[Tile, ...], paper: Paper) -> str:
 
 def _steps(target: Target) -> tuple[str, ...]:
     return (
-        "Print all sheets at 100 % (\"actual size\", not \"fit to page\"), on matt paper: gloss mirrors the sun.\n"
+        'Print all sheets at 100 % ("actual size", not "fit to page"), on matt paper: gloss mirrors the sun.\n'
         "Measure the bar below with a ruler. If it is not 10 cm, the target has another size than it says.",
-        f"On each sheet cut along the marks at the top and at the left. At the right and below, sheets with dashed\n"
-        f"lines keep their {OVERLAP_MM:g} mm beyond these lines: the next sheet is glued onto them, its cut edge on the line.",
+        "On each sheet cut along the marks at the top and at the left. At the right and below, sheets with dashed\n"
+        f"lines keep their {OVERLAP_MM:g} mm beyond these: the next sheet is glued there, its cut edge on the line.",
         "Glue row by row, then the rows, onto a flat stiff board. Do not cut the white edge off: it is needed.",
         f"Measure the black square, outer edge to outer edge, on all four sides. Give standoff what you measured\n"
         f"(here {target.size_m:.3f} m): every distance grows and shrinks with it.",
         "Lay it flat and level, where the drone sees it and nobody drives. The site's x runs from corner 0\n"
         "(filled disc) along the arrow to corner 1, y from corner 0 to corner 3.",
-        f"standoff run VIDEO --out RUN --ground marker:{target.size_m:g}"
+        f"Then:  standoff run VIDEO --out RUN --ground marker:{target.size_m:g}"
         + (f",id={target.marker_id}" if target.marker_id else ""),
     )
 
@@ -90,7 +94,12 @@ def _draw_sketch(
         )  # fmt: skip
     first, last = left + target.edge_mm * scale, left + (target.edge_mm + target.size_mm) * scale
     line = bottom - 5.0
-    axes.annotate("", (first, line), (last, line), arrowprops={"arrowstyle": "<->", "color": INK, "lw": 0.8, "shrinkA": 0, "shrinkB": 0})
+    axes.annotate(
+        "",
+        (first, line),
+        (last, line),
+        arrowprops={"arrowstyle": "<->", "color": INK, "lw": 0.8, "shrinkA": 0, "shrinkB": 0},
+    )
     for x in (first, last):
         axes.plot([x, x], [bottom + target.edge_mm * scale - 1.0, line - 2.0], color=INK, linewidth=0.4)
     axes.text(

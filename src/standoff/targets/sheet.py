@@ -51,7 +51,9 @@ class Target:
         low_m, high_m = SIZE_LIMITS_M
         if not low_m <= self.size_m <= high_m:
             raise ConfigError(
-                expected=f"a black square of {low_m:g} to {high_m:g} m", found=f"{self.size_m:g} m", fix="choose a size in between"
+                expected=f"a black square of {low_m:g} to {high_m:g} m",
+                found=f"{self.size_m:g} m",
+                fix="choose a size in between",
             )
         marker_pattern(self.family, self.marker_id)
 

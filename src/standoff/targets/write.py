@@ -70,10 +70,9 @@ def _tile_page(target: Target, tile: Tile, numbered: str) -> Figure:
     draw_target(axes, target, offset, clip=window)
     _draw_marks(axes, tile)
     top = MARGIN_MM + height
-    note = f"row {tile.row + 1}, column {tile.column + 1}   ({numbered})   {target.family} id {target.marker_id}, {target.size_m:g} m"
-    axes.text(
-        MARGIN_MM + 10.0, top + 4.2, f"{tile_name(tile)}   {note}", fontsize=points(3.0), color=NOTE, va="center"
-    )
+    which = f"row {tile.row + 1}, column {tile.column + 1}   ({numbered})"
+    note = f"{which}   {target.family} id {target.marker_id}, {target.size_m:g} m"
+    axes.text(MARGIN_MM + 10.0, top + 4.2, f"{tile_name(tile)}   {note}", fontsize=points(3.0), color=NOTE, va="center")
     draw_bar(axes, MARGIN_MM + 2.0, 4.8, "measure after printing: this bar is exactly 10 cm")
     return figure
 
@@ -88,8 +87,11 @@ def _draw_marks(axes: Axes, tile: Tile) -> None:
     for y in (bottom, top):
         for x, away in ((left, -1.0), (right, 1.0)):
             axes.plot([x + away * 1.0, x + away * _MARK_MM], [y, y], color=INK, linewidth=0.4)
-    dashes = {"color": FAINT, "linewidth": 0.6, "linestyle": (0, (4, 3))}
     if tile.has_right:
-        axes.plot([right - OVERLAP_MM] * 2, [bottom, top], **dashes)
+        _draw_dashes(axes, [right - OVERLAP_MM] * 2, [bottom, top])
     if tile.has_below:
-        axes.plot([left, right], [bottom + OVERLAP_MM] * 2, **dashes)
+        _draw_dashes(axes, [left, right], [bottom + OVERLAP_MM] * 2)
+
+
+def _draw_dashes(axes: Axes, xs_mm: list[float], ys_mm: list[float]) -> None:
+    axes.plot(xs_mm, ys_mm, color=FAINT, linewidth=0.6, linestyle=(0, (4, 3)))

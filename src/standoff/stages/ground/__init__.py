@@ -3,6 +3,11 @@
 from standoff.stages.ground.boards import BoardView, find_corners, read_boards
 from standoff.stages.ground.calibration import CalibrationResult, calibrate, calibrate_views
 from standoff.stages.ground.camera_file import load_camera, save_camera
+from standoff.stages.ground.marker_family import MARKER_FAMILIES, MarkerFamily, marker_pattern
+from standoff.stages.ground.marker_observer import MarkerObserver
+from standoff.stages.ground.marker_place import MarkerPlace
+from standoff.stages.ground.markers import Markers, find_markers
+from standoff.stages.ground.observation import PointObservation
 from standoff.stages.ground.params import ReferenceParams
 from standoff.stages.ground.reference import ReferenceGround
 from standoff.stages.ground.shape import ReferenceShape
@@ -11,8 +16,14 @@ from standoff.stages.ground.surveyed import SurveyedGround
 from standoff.stages.ground.unmapped import Unmapped
 
 __all__ = [
+    "MARKER_FAMILIES",
     "BoardView",
     "CalibrationResult",
+    "MarkerFamily",
+    "MarkerObserver",
+    "MarkerPlace",
+    "Markers",
+    "PointObservation",
     "ReferenceGround",
     "ReferenceParams",
     "ReferenceShape",
@@ -21,8 +32,10 @@ __all__ = [
     "calibrate",
     "calibrate_views",
     "find_corners",
+    "find_markers",
     "load_camera",
     "load_survey",
+    "marker_pattern",
     "read_boards",
     "save_camera",
 ]

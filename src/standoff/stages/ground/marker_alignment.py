@@ -84,7 +84,7 @@ def align(gray: ImageArray, corners_px: FloatArray, pattern: BoolArray) -> Align
 
 
 def _cut(gray: ImageArray, corners_px: FloatArray, modules: int) -> tuple[_Float32Array, float, FloatArray]:
-    """Return the marker and the white around it in linear light, (h, w) 0..1, its scale, and its first pixel in scaled pixels."""
+    """Return the marker and its white in linear light, (h, w) 0..1, its scale, and its first pixel, scaled."""
     side_px = float(np.linalg.norm(corners_px - np.roll(corners_px, 1, axis=0), axis=1).mean())
     shrink = max(1, int(np.ceil(side_px / _PATCH_SIDE_PX)))
     margin_px = 1.5 * side_px / modules + 2.0 * shrink
@@ -136,7 +136,8 @@ def _step(patch: _Float32Array, corners: FloatArray, pattern: BoolArray) -> Alig
     likeness = np.float32(lit[0]) * drawn + np.float32(lit[2]) * bend + np.float32(lit[3]) * spread
     slope_x, slope_y = (slope.ravel()[inside] for slope in _slopes(likeness))
     columns[:, _LIGHT:] = -_moves(unit_to_patch, unit, slope_x, slope_y)
-    return _solved(columns, seen, (np.abs(unit - 0.5) < 0.5 - 1.0 / len(pattern)).all(axis=1))
+    coded: BoolArray = np.abs(unit - 0.5).max(axis=1) < 0.5 - 1.0 / len(pattern)
+    return _solved(columns, seen, coded)
 
 
 def _slopes(picture: _Float32Array) -> tuple[_Float32Array, _Float32Array]:
@@ -156,9 +157,7 @@ def _unit_points(shape: tuple[int, ...], unit_to_patch: FloatArray) -> FloatArra
     return unit
 
 
-def _moves(
-    unit_to_patch: FloatArray, unit: FloatArray, slope_x: _Float32Array, slope_y: _Float32Array
-) -> FloatArray:
+def _moves(unit_to_patch: FloatArray, unit: FloatArray, slope_x: _Float32Array, slope_y: _Float32Array) -> FloatArray:
     """Return (N, 8): how grey levels change with a corner's x or y, in the order x y x y ... of the four corners."""
     at_corners = homography.parameter_jacobian(unit_to_patch, _UNIT.astype(np.float64))[..., :8].reshape(8, 8)
     ends = np.column_stack([unit, np.ones(len(unit))])

@@ -39,7 +39,9 @@ def marker_dictionary(family: MarkerFamily) -> Any:  # noqa: ANN401
     """
     if family not in _DICTIONARIES:
         raise GroundError(
-            expected=f"a marker family, one of {', '.join(MARKER_FAMILIES)}", found=repr(family), fix="choose one of them"
+            expected=f"a marker family, one of {', '.join(MARKER_FAMILIES)}",
+            found=repr(family),
+            fix="choose one of them",
         )
     return cv2.aruco.getPredefinedDictionary(_DICTIONARIES[family])
 
@@ -73,7 +75,9 @@ def marker_pattern(family: MarkerFamily, marker_id: int) -> BoolArray:
     count = marker_count(family)
     if not 0 <= marker_id < count:
         raise GroundError(
-            expected=f"an id from 0 to {count - 1} for {family}", found=str(marker_id), fix="choose another id or family"
+            expected=f"an id from 0 to {count - 1} for {family}",
+            found=str(marker_id),
+            fix="choose another id or family",
         )
     dictionary = marker_dictionary(family)
     drawn = cv2.aruco.generateImageMarker(dictionary, marker_id, dictionary.markerSize + 2, borderBits=1)

@@ -55,7 +55,9 @@ class MarkerObserver:
         self._misses: dict[int, int] = {}
         self._searched_s: float | None = None
 
-    def observe(self, gray: ImageArray, guess: View | None = None, time_s: float | None = None) -> list[PointObservation]:
+    def observe(
+        self, gray: ImageArray, guess: View | None = None, time_s: float | None = None
+    ) -> list[PointObservation]:
         """Look for the markers in one frame.
 
         Args:
@@ -112,7 +114,7 @@ class MarkerObserver:
         expected_px = min((float(np.linalg.norm(np.diff(one, axis=0), axis=1).min()) for one in lasts), default=None)
         cut = np.ascontiguousarray(gray[top:bottom, left:right])
         markers = find_markers(cut, self._family, wanted=wanted, expected_px=expected_px)
-        shifted = Markers(markers.ids, markers.corners_px + [left, top], markers.sigma_px)
+        shifted = Markers(markers.ids, markers.corners_px + np.array([left, top]), markers.sigma_px)
         for marker_id, corners_px, sigma_px in zip(
             shifted.ids.tolist(), shifted.corners_px, shifted.sigma_px, strict=True
         ):

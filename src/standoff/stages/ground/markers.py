@@ -28,7 +28,7 @@ _LEAST_LIKENESS = 0.8
 _SIGMA_FACTOR = 2.0
 """What the drawing leaves unexplained is not independent from pixel to pixel, least of all after H.264, which also
 moves whole blocks by fractions of a pixel (the floor). Both measured on drawn films."""
-_SIGMA_FLOOR_PX = 0.07
+_SIGMA_FLOOR_PX = 0.1
 _ENLARGED_PX = 700_000
 """Pictures with fewer pixels are searched at twice their size: it finds smaller markers, and takes no long time."""
 
