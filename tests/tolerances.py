@@ -131,3 +131,8 @@ COMPOSED_PX = 0.8
 COASTED_PX = 6.0
 """Centres of boxes that coast for 0.6 s on velocities filtered in five frames a second while people's headings turn in
 the picture; with the motion ignored it is more than 100."""
+MARKER_CORNER_PX = 0.35
+"""Largest of four corners' errors of a drawn marker of 24 px or more with a grey level of noise: 0.06 px on average."""
+
+PDF_POINTS = 1e-3
+"""A page's size as PDF writes it, in points of 0.35 mm, against its millimetres."""

@@ -50,14 +50,36 @@ def _shape_overrides(ground: str) -> dict[str, Any] | None:
     return shape
 
 
+def _marker_override(text: str) -> dict[str, Any]:
+    """Read `marker:SIZE` or `marker:SIZE,id=ID` into settings of the only marker, which defines the site frame."""
+    size, *words = text.removeprefix("marker:").split(",")
+    size_m = _numbers(size, 1, "--ground marker:SIZE")[0]
+    marker: dict[str, Any] = {"size_m": size_m}
+    for word in words:
+        name, _, value = word.strip().partition("=")
+        if name != "id" or not value.isdecimal() or len(words) > 1:
+            raise ConfigError(
+                expected="--ground marker:SIZE or marker:SIZE,id=ID",
+                found=repr(text),
+                fix="write for example marker:1.2,id=3",
+            )
+        marker["id"] = int(value)
+    return {"markers": [marker], "survey": None, "reference": None}
+
+
 def _ground_overrides(ground: str | None, box: str | None, camera: Path | None) -> dict[str, Any]:
     """Translate `--ground`, `--reference-box` and `--camera` into settings."""
     overrides: dict[str, Any] = {}
-    if ground == "none":
+    if ground is not None and ground.startswith("marker:"):
+        overrides |= _marker_override(ground)
+    elif ground == "none":
         overrides |= {"survey": None, "reference": None}
     elif ground is not None:
         shape = _shape_overrides(ground)
         overrides |= {"survey": None if shape else ground, "reference": shape}
+    if ground is not None:
+        # What the command line names is the ground; the file's markers may lie in another frame.
+        overrides.setdefault("markers", [])
     if box is not None:
         overrides.setdefault("reference", {})
         if overrides["reference"] is None:
@@ -100,7 +122,8 @@ def run(
         str | None,
         typer.Option(
             help="square:SIDE or rectangle:LENGTH,WIDTH (a reference object, m; ,height=H where its top is so high "
-            "above the ground), survey.yaml (surveyed points), or none."
+            "above the ground), marker:SIZE[,id=ID] (a printed marker, black square in m), survey.yaml (surveyed "
+            "points), or none."
         ),
     ] = None,
     reference_box: Annotated[

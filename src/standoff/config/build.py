@@ -13,7 +13,15 @@ from standoff.core.protocols import CameraMotionEstimator, Detector, Ground
 from standoff.core.types import Frame
 from standoff.pipeline import Pipeline
 from standoff.stages.detect import OnnxDetector, RecordedDetector, find_model
-from standoff.stages.ground import FusedGround, GivenPlace, ReferenceGround, Unmapped, load_camera, load_survey
+from standoff.stages.ground import (
+    FusedGround,
+    GivenPlace,
+    MarkerObserver,
+    ReferenceGround,
+    Unmapped,
+    load_camera,
+    load_survey,
+)
 from standoff.stages.hazard import HazardMonitor
 from standoff.stages.locate import Locator
 from standoff.stages.motion import MotionEstimator
@@ -81,6 +89,17 @@ def build_motion(settings: Settings) -> CameraMotionEstimator:
     return MotionEstimator(settings.motion, _configured_camera(settings))
 
 
+def build_marker_observer(settings: Settings) -> MarkerObserver | None:
+    """Make what watches for the configured markers; None where there are none.
+
+    Raises:
+        GroundError: An id that the family does not have.
+    """
+    if not settings.ground.markers:
+        return None
+    return MarkerObserver([marker.place() for marker in settings.ground.markers], settings.ground.marker_family)
+
+
 def build_ground(settings: Settings, known: CameraPrior | None = None) -> Ground:
     """Make the configured ground stage.
 
@@ -92,6 +111,13 @@ def build_ground(settings: Settings, known: CameraPrior | None = None) -> Ground
         GroundError: Its points, shape or camera file cannot be used.
     """
     camera = _configured_camera(settings)
+    if settings.ground.markers:
+        # Silence about a marker that nobody reads would pass for a site without one.
+        raise ConfigError(
+            expected="a ground stage of your own that reads markers (replace.ground)",
+            found="ground.markers with standoff's own, which does not read them yet",
+            fix="take the markers out, or describe a reference object or a survey",
+        )
     if settings.ground.survey is not None:
         return load_survey(settings.ground.survey, camera=camera)
     reference = settings.ground.reference

@@ -11,8 +11,9 @@ from typing import Annotated, Any, Literal, get_type_hints
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
+from standoff.config.markers import MarkerSettings, check_markers
 from standoff.stages.detect import DetectParams, ShippedModel
-from standoff.stages.ground import ReferenceParams, ReferenceShape
+from standoff.stages.ground import MarkerFamily, ReferenceParams, ReferenceShape
 from standoff.stages.hazard import HazardParams
 from standoff.stages.locate import LocateParams
 from standoff.stages.motion import MotionParams
@@ -101,12 +102,20 @@ class GroundSettings(_Section):
             "where it is (box_px, box_time_s, first_corner_px), and params (method, thresholds)."
         ),
     ] = None
+    markers: Annotated[
+        tuple[MarkerSettings, ...],
+        Field(
+            description="Printed markers (see `standoff marker`): id, size_m, and a place unless it is the only one."
+        ),
+    ] = ()
+    marker_family: Annotated[MarkerFamily, Field(description="Of all printed markers.")] = "apriltag36h11"
     camera: Annotated[Path | None, Field(description="Camera file whose lens distortion is removed first.")] = None
 
     @model_validator(mode="after")
     def _one_source(self) -> GroundSettings:
         if self.survey is not None and self.reference is not None:
             raise ValueError("give either survey or reference, not both")
+        check_markers(self.markers, "survey" if self.survey else "reference" if self.reference else None)
         return self
 
 

@@ -172,7 +172,7 @@ def sample_edges(shape: ReferenceShape, state: SolidState) -> EdgeSamples:
 
 
 def _free_reach(ends_px: FloatArray, normal: FloatArray, level: BoolArray) -> FloatArray:
-    """Return (E,) half the distance from each edge to the nearest level one that runs beside it, in px; inf if none does.
+    """Return (E,) half the distance from each edge to the nearest level one beside it, in px; inf if there is none.
 
     Upright edges are too short to hem in others.
     """
