@@ -28,7 +28,7 @@ NUMERIC = (
 
 _AVX512 = ("X86_V4", "AVX512")
 """How numpy's names for it begin."""
-_SINGLE = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")}
+_SINGLE = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 """Sums in threads are in another order."""
 _AS_IN_2008 = {
     "OPENCV_IPP": "disabled",
