@@ -1,6 +1,9 @@
 # make demo   the whole monitor on a film that comes with it; installs the runtime only
-# make test   everything that CI checks
-# Both set themselves up on a fresh Debian or Ubuntu with python3 and make.
+# make test   lint, types, layer contracts and tests: the same examples on every machine
+# make test-live   the tests that need servers or take long, which make test leaves out
+# make test-processors   the numeric tests as older processors would compute; TESTS=... for others
+# make fuzz   the laws with many more examples, and others each time; prints how to repeat a failure
+# All set themselves up on a fresh Debian or Ubuntu with python3 and make.
 
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
@@ -17,7 +20,7 @@ WORKERS ?= 2
 DEMO_VENV := .venv-demo
 SOURCES := $(shell find src -type f -not -path '*/__pycache__/*')
 
-.PHONY: help setup test lint types contracts unit demo demo-clean demo-pets docs bench lock clean
+.PHONY: help setup test test-live test-processors fuzz lint types contracts unit demo demo-clean demo-pets docs bench lock clean
 
 help:
 	@sed -n 's/^# make/make/p' Makefile
@@ -47,7 +50,20 @@ venv-by-apt:
 	  { echo "python3 has no venv module: install it (python3-venv) and run make again."; exit 2; }; \
 	$$sudo apt-get update -qq && $$sudo apt-get install -y -qq python3-venv && $(PYTHON) -m venv --clear $(VENV)
 
-test: lint types contracts unit
+# Types are checked while the tests run: alone, mypy leaves a core idle.
+test: lint contracts
+	@$(MAKE) --no-print-directory --jobs=2 types unit
+
+# pytest leaves with 5 where nothing is marked, and only then is that no failure.
+test-live: $(READY)
+	@code=0; $(BIN)/python -m pytest tests -m live || code=$$?; \
+	if [ $$code = 5 ]; then echo "No test is marked live."; else exit $$code; fi
+
+test-processors: $(READY)
+	$(BIN)/python tests/other_processors.py $(TESTS)
+
+fuzz: $(READY)
+	$(BIN)/python -m pytest $(or $(TESTS),tests) -n $(WORKERS) -m "hypothesis and not live" --hypothesis-profile=fuzz
 
 lint: $(READY)
 	$(BIN)/ruff check .
@@ -60,7 +76,7 @@ contracts: $(READY)
 	$(BIN)/lint-imports
 
 unit: $(READY)
-	$(BIN)/python -m pytest -n $(WORKERS) --cov --cov-report=term --cov-fail-under=95
+	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal --cov --cov-report=term --cov-fail-under=95
 
 bench: $(READY)
 	$(BIN)/python -m pytest benchmarks -p no:xdist --benchmark-only --benchmark-columns=median,iqr,rounds

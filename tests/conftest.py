@@ -4,10 +4,20 @@ import os
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
+from laws import FUZZ, forget_our_constants, register_profiles
 
 from standoff.core.errors import MissingDependency
 
+register_profiles()
+
 _PROJECT = Path(__file__).resolve().parent.parent
+
+
+@pytest.hookimpl(trylast=True)  # after hypothesis has read which profile is asked for
+def pytest_configure() -> None:
+    if settings.get_current_profile_name() != FUZZ:
+        forget_our_constants()
 
 
 @pytest.fixture(scope="session")

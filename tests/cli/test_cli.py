@@ -16,6 +16,7 @@ import pyarrow.parquet as pq
 import pytest
 import yaml
 from cli.calling import Call
+from pages import PageReader
 
 from standoff.core.errors import GroundError
 from standoff.core.protocols import AnyMotion
@@ -324,4 +325,5 @@ def test_an_interrupted_run_leaves_whole_files_that_say_so(
     assert pq.read_table(tmp_path / "out" / "frames.parquet").num_rows == record["counts"]["frames"] > 0
     with av.open(str(film)) as container:
         assert sum(1 for _ in container.decode(video=0)) == record["counts"]["frames"]
-    assert "interrupted" in (tmp_path / "out" / "report.html").read_text().lower()
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "interrupted" in PageReader.of(page).text

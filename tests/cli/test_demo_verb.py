@@ -77,6 +77,7 @@ def test_a_broken_installation_is_one_line(drawn: Clip, tmp_path: Path, call: Ca
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.live
 def test_the_shipped_detector_sees_the_breach_and_the_near_miss(tmp_path: Path, call: Call) -> None:
     assert call("demo", "--out", tmp_path / "out", "--json", tmp_path / "found.json")[0] == 0
     found = json.loads((tmp_path / "found.json").read_text())

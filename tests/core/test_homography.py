@@ -3,7 +3,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from skimage.transform import ProjectiveTransform
 from tolerances import FIRST_ORDER_SIGMA_REL, GEOMETRY_REL
@@ -160,7 +160,6 @@ def test_the_error_of_a_distance_through_the_map_is_that_of_random_trials(seed: 
 
 
 @given(maps, st.floats(-np.pi, np.pi), st.floats(-1e3, 1e3), st.floats(-1e3, 1e3), seeds)
-@settings(deadline=None)
 def test_distances_do_not_change_when_the_site_is_turned_or_shifted(
     image_to_ground: FloatArray, angle: float, east_m: float, north_m: float, seed: int
 ) -> None:

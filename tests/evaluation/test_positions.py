@@ -10,8 +10,9 @@ from evaluation.standing_people import (
     make_tracks,
     make_truth,
 )
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from laws import examples
 
 from standoff.core.errors import DataError
 from standoff.evaluation.positions import PositionsResult, score_positions
@@ -39,7 +40,7 @@ def test_only_pairs_up_to_the_limit_are_scored() -> None:
     assert score(truth, make_tracks(truth), pairs_up_to_m=50.0).pairs.true_pairs == 6 * FRAMES
 
 
-@settings(max_examples=20, deadline=None)
+@examples(20)
 @given(st.integers(0, 2**32 - 1))
 def test_figures_are_those_of_the_errors_put_in(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -60,7 +61,7 @@ def test_figures_are_those_of_the_errors_put_in(seed: int) -> None:
     assert result.pairs.within_2_sigma == pytest.approx((np.abs(wrong_m) <= 0.2).mean())
 
 
-@settings(max_examples=20, deadline=None)
+@examples(20)
 @given(st.floats(-np.pi, np.pi), st.floats(-100.0, 100.0))
 def test_turning_and_shifting_the_site_changes_no_distance_error(angle: float, shift_m: float) -> None:
     rng = np.random.default_rng(5)

@@ -5,8 +5,9 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from laws import examples
 
 from standoff.evaluation.drawn_quadrilaterals import DIFFICULTIES, area_coverage, draw_scene
 from standoff.evaluation.rectification import METHODS, MethodScore, RectificationResult, evaluate_rectification
@@ -69,7 +70,7 @@ def test_no_scenes_are_refused() -> None:
         evaluate_rectification(scenes=0)
 
 
-@settings(max_examples=20, deadline=None)
+@examples(20)
 @given(st.integers(0, 10_000))
 def test_the_drawn_area_is_the_true_area(seed: int) -> None:
     corners = draw_scene("clean", seed).corners_px

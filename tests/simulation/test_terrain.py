@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 import shapely
 import trimesh
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from laws import examples
 
 from standoff.simulation.relief import beside, grid_shape, make_relief
 from standoff.simulation.site_plans import SiteStyle, random_plan
@@ -61,7 +62,7 @@ def test_heights_are_those_of_the_triangles_split_from_south_west_to_north_east(
     np.testing.assert_allclose(terrain.height_at(points[:, :2]), points[:, 2], atol=1e-9)
 
 
-@settings(max_examples=50, deadline=None)
+@examples(50)
 @given(
     corners=st.lists(st.floats(-3.0, 3.0, width=32), min_size=4, max_size=4),
     east=st.floats(0.0, 1.0),
@@ -225,7 +226,7 @@ def test_the_grid_covers_the_extent() -> None:
     np.testing.assert_allclose(terrain.origin_xy_m, (-12.0, -10.0))
 
 
-@settings(max_examples=30, deadline=None)
+@examples(30)
 @given(st.floats(0.1, 5.0), st.floats(-np.pi, np.pi))
 def test_a_shifted_straight_path_keeps_its_distance(offset_m: float, turn: float) -> None:
     line = np.linspace(0.0, 20.0, 7)[:, None] * np.array([np.cos(turn), np.sin(turn)])

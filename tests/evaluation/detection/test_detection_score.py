@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import tolerances
 from evaluation.detection.drawn_detections import CLASSES, detections, picture, random_scenes
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from pycocotools.coco import COCO
 from pycocotools.cocoeval import COCOeval
@@ -92,7 +92,6 @@ def test_matching_and_ap_are_those_of_pycocotools(seed: int) -> None:
 
 
 @given(counted, st.integers(1, 30))
-@settings(deadline=None)
 def test_eleven_points_are_those_of_vocs_definition(rows: list[tuple[int, bool]], spare: int) -> None:
     score = np.linspace(1.0, 0.1, len(rows))
     matched = np.array([hit for _, hit in rows], dtype=np.bool_)
@@ -102,7 +101,6 @@ def test_eleven_points_are_those_of_vocs_definition(rows: list[tuple[int, bool]]
 
 
 @given(counted, st.integers(1, 10), st.floats(0.05, 1.0))
-@settings(deadline=None)
 def test_what_a_curve_says_of_thresholds_is_what_counting_says(
     rows: list[tuple[int, bool]], spare: int, precision: float
 ) -> None:

@@ -5,8 +5,9 @@ from collections.abc import Mapping
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
+from laws import examples
 from tolerances import FOOT_ON_GROUND_M
 
 from standoff.core.classes import CLASS_BY_NAME
@@ -49,7 +50,7 @@ def joint_values() -> st.SearchStrategy[dict[str, float]]:
     )
 
 
-@settings(max_examples=150, deadline=None)
+@examples(150)
 @given(seed=st.integers(0, 40), joints=joint_values())
 @example(seed=16, joints={"bend_deg": 95.0, "crouch": 1.0, "arms": 0.1, "turn_deg": -60.0})
 def test_the_lowest_foot_is_on_the_ground_whatever_the_joints(seed: int, joints: dict[str, float]) -> None:
@@ -58,13 +59,13 @@ def test_the_lowest_foot_is_on_the_ground_whatever_the_joints(seed: int, joints:
     assert abs(lowest_m) < FOOT_ON_GROUND_M
 
 
-@settings(max_examples=40, deadline=None)
+@examples(40)
 @given(seed=st.integers(0, 60), joints=joint_values())
 def test_nothing_that_is_carried_is_below_the_ground(seed: int, joints: dict[str, float]) -> None:
     assert all(vertices(batch)[:, 2].min() > -0.06 for batch in carried_by(worker(seed), {**joints, "arms": 1.0}))
 
 
-@settings(max_examples=40, deadline=None)
+@examples(40)
 @given(seed=st.integers(0, 40), joints=joint_values())
 def test_no_joint_value_tears_a_body_apart(seed: int, joints: dict[str, float]) -> None:
     person = worker(seed)

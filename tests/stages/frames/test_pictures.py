@@ -7,8 +7,9 @@ import cv2
 import numpy as np
 import pytest
 from av.video.reformatter import VideoReformatter
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from laws import examples
 from stages.frames.coded_video import Recipe, coded_picture, write_video
 from tolerances import GRAY_LEVELS, RESIZED_LEVELS, SWSCALE_LEVELS
 
@@ -77,7 +78,7 @@ def test_black_and_white_are_0_and_255_in_either_range(tmp_path: Path, color_ran
     pixel_format=st.sampled_from(["yuv420p", "yuv444p", "bgr24", "yuv420p10le"]),
     seed=st.integers(0, 99),
 )
-@settings(max_examples=60, deadline=None)
+@examples(60)
 def test_resizing_is_close_to_resizing_the_full_picture(
     width_px: int, height_px: int, rotation_deg: int, pixel_format: str, seed: int
 ) -> None:

@@ -10,8 +10,9 @@ import av
 import cv2
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from laws import examples
 from stages.frames.coded_video import Recipe, index_in, write_video
 
 from standoff.core.errors import FrameSizeChanged, SourceError, SourceTruncated
@@ -62,7 +63,7 @@ def test_times_are_the_presentation_timestamps_from_the_first_frame_on(videos: d
 @given(
     start_s=st.floats(0, 2.1), length_s=st.floats(0.11, 7), every=st.integers(1, 7), name=st.sampled_from([*RECIPES])
 )
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@examples(60)
 def test_a_part_holds_the_same_frames_as_the_whole(
     videos: dict[str, Path], start_s: float, length_s: float, every: int, name: str
 ) -> None:

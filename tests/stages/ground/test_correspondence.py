@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from drawn_ground import SIZE_PX, lens, view
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from standoff.core import homography
@@ -18,7 +18,6 @@ tilts, yaws, focals = st.floats(5.0, 70.0), st.floats(0.0, 360.0), st.floats(250
 turns = st.integers(0, 3)
 
 
-@settings(deadline=None)  # the first call compiles
 @given(tilts, yaws, focals, turns, st.sampled_from([FOOTING, PLANK, ReferenceShape.square(2.89)]))
 def test_the_true_order_of_corners_is_one_that_a_camera_could_see(
     tilt: float, yaw: float, focal_px: float, turn: int, shape: ReferenceShape
@@ -33,7 +32,6 @@ def test_the_true_order_of_corners_is_one_that_a_camera_could_see(
     assert camera_misfit_px(listed, shape, SIZE_PX, FOCAL_WIDTHS, camera)[turn] < 1e-3
 
 
-@settings(deadline=None)  # the first call compiles
 @given(st.floats(5.0, 40.0), yaws, st.sampled_from([FOOTING, PLANK]))
 def test_a_known_camera_tells_the_corners_of_an_uneven_shape_apart(
     tilt: float, yaw: float, shape: ReferenceShape
@@ -45,7 +43,6 @@ def test_a_known_camera_tells_the_corners_of_an_uneven_shape_apart(
     assert misfit[others].min() > 5.0
 
 
-@settings(deadline=None)  # the first call compiles
 @given(tilts, yaws)
 def test_any_order_suits_a_square(tilt: float, yaw: float) -> None:
     camera = lens()
@@ -53,7 +50,6 @@ def test_any_order_suits_a_square(tilt: float, yaw: float) -> None:
     assert camera_misfit_px(corners_px, ReferenceShape.square(2.89), SIZE_PX, FOCAL_WIDTHS, camera).max() < 1e-3
 
 
-@settings(deadline=None)  # the first call compiles
 @given(tilts, yaws, st.integers(0, 1000))
 def test_the_misfit_is_no_more_than_the_corners_were_moved(tilt: float, yaw: float, seed: int) -> None:
     camera = lens()

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from skimage.measure import LineModelND
 from tolerances import GEOMETRY_REL
@@ -49,7 +49,6 @@ def test_points_that_run_out_give_no_contours() -> None:
     assert ransac_contours(np.full((30, 2), 7.0), pairs, 1.0) is None
 
 
-@settings(deadline=None)  # the first call compiles
 @given(st.floats(0.0, np.pi), st.floats(-50.0, 50.0), st.integers(0, 1000))
 def test_total_least_squares_agrees_with_scikit_image(angle: float, offset: float, seed: int) -> None:
     rng = np.random.default_rng(seed)

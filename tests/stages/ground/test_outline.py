@@ -2,8 +2,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from laws import examples
 
 from standoff.core.homography import FloatArray
 from standoff.core.types import ImageArray, NoGroundMap
@@ -48,7 +49,7 @@ def test_the_same_picture_gives_the_same_corners_whatever_came_before(method: Re
     np.testing.assert_array_equal(fresh.corners_px, first)
 
 
-@settings(max_examples=15, deadline=None)
+@examples(15)
 @given(st.integers(-40, 40), st.integers(-40, 40), st.sampled_from(METHODS), st.integers(0, 5))
 def test_corners_move_with_the_picture(right: int, down: int, method: ReferenceMethod, seed: int) -> None:
     scene = draw_scene("clean", seed)
@@ -60,7 +61,7 @@ def test_corners_move_with_the_picture(right: int, down: int, method: ReferenceM
     np.testing.assert_allclose(there - here, np.broadcast_to([right, down], (4, 2)), atol=1e-6)
 
 
-@settings(max_examples=15, deadline=None)
+@examples(15)
 @given(st.integers(0, 5), st.integers(1, 3))
 def test_corners_turn_with_the_picture(seed: int, quarters: int) -> None:
     scene = draw_scene("clean", seed)
@@ -73,7 +74,7 @@ def test_corners_turn_with_the_picture(seed: int, quarters: int) -> None:
     assert np.linalg.norm(errors, axis=1).max() < WORST_PX["oriented"]
 
 
-@settings(max_examples=15, deadline=None)
+@examples(15)
 @given(st.floats(0.5, 1.0), st.integers(0, 20), st.booleans(), st.integers(0, 5))
 def test_corners_stay_where_light_changes_or_is_inverted(share: float, level: int, inverted: bool, seed: int) -> None:
     scene = draw_scene("clean", seed)

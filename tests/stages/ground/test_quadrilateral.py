@@ -4,7 +4,7 @@ from itertools import permutations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from standoff.core.homography import FloatArray
@@ -31,7 +31,6 @@ def side_lines(
     return np.array([line_through(corners[k], corners[(k + 1) % 4]) for k in range(4)])
 
 
-@settings(deadline=None)  # the first call compiles
 @given(
     st.integers(0, 200), st.sampled_from(list(permutations(range(4)))), st.lists(st.booleans(), min_size=4, max_size=4)
 )

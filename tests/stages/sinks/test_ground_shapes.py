@@ -5,8 +5,9 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from laws import examples
 from stages.sinks.fake_site import FakeSite
 from tolerances import DISTORTION_PX, GEOMETRY_REL
 
@@ -31,7 +32,7 @@ def _map_of_camera(height_m: float, pitch_deg: float, camera: Camera | None = No
 
 
 @pytest.mark.parametrize("camera", [None, LENS])
-@settings(max_examples=40)
+@examples(40)
 @given(x=st.floats(-15, 15), y=st.floats(-5, 25), radius=st.floats(0.5, 6))
 def test_the_drawn_ellipse_is_the_circle_on_the_ground(
     camera: Camera | None, x: float, y: float, radius: float

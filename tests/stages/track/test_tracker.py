@@ -2,8 +2,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from laws import examples
 
 from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.homography import FloatArray
@@ -113,7 +114,7 @@ def test_a_rest_of_the_detector_is_not_a_miss() -> None:
     assert tracks.observed.all()
 
 
-@settings(max_examples=30, deadline=None)
+@examples(30)
 @given(
     st.integers(0, 2**32 - 1),
     st.floats(-40.0, 40.0),
@@ -167,7 +168,7 @@ def test_streams_do_not_know_each_other() -> None:
         assert np.array_equal(expected.xyxy_px, found.xyxy_px)
 
 
-@settings(max_examples=30, deadline=None)
+@examples(30)
 @given(st.permutations(range(5)))
 def test_the_order_of_detections_does_not_matter(order: list[int]) -> None:
     boxes = Detections(

@@ -4,15 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from laws import examples
 from training.drawn_pictures import draw_boxes, draw_ellipses, thing_share
 
 from standoff.training.pictures.augment_params import AugmentParams
 from standoff.training.pictures.cut_outs import hide_parts
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(st.integers(0, 10_000))
 def test_patches_hide_things_and_never_copy_them(seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -7,8 +7,9 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from laws import examples
 from scipy import stats
 
 from standoff.core.types import ImageArray
@@ -29,7 +30,7 @@ def _only(**settings: Any) -> AugmentParams:
     return replace(_NONE, **settings)
 
 
-@settings(max_examples=30)
+@examples(30)
 @given(st.integers(0, 10_000))
 def test_a_picture_keeps_its_size_and_most_of_its_content(seed: int) -> None:
     scene = _scene()

@@ -6,8 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from laws import examples
 from tolerances import FLOAT32_LOSS_REL
 
 from standoff.training.darknet.cfg import Yolo
@@ -193,7 +194,7 @@ def test_twice_the_same_pictures_give_the_same_loss() -> None:
     )
 
 
-@settings(max_examples=60)
+@examples(60)
 @given(st.lists(st.floats(1.0, 100.0), min_size=8, max_size=8))
 def test_complete_iou_is_what_its_paper_says(numbers: list[float]) -> None:
     first = [numbers[0], numbers[1], numbers[0] + numbers[2], numbers[1] + numbers[3]]

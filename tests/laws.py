@@ -1,0 +1,36 @@
+"""How hard a law is tried: with the same examples everywhere, or in an open search (`make fuzz`)."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import HealthCheck, settings
+from hypothesis.internal.conjecture import providers
+
+TEST = "test"
+FUZZ = "fuzz"
+EXAMPLES = 100
+"""Of a law that does not say how many it is worth."""
+FUZZ_TIMES = 20
+"""As many examples in the open search."""
+
+
+def register_profiles() -> None:
+    """Make the fixed examples the default; `--hypothesis-profile fuzz` asks for the search."""
+    # How long an example takes depends on the machine and on what else it does.
+    patient = settings(deadline=None, print_blob=True, suppress_health_check=[HealthCheck.too_slow])
+    settings.register_profile(TEST, patient, derandomize=True, database=None, max_examples=EXAMPLES)
+    settings.register_profile(FUZZ, patient, max_examples=EXAMPLES * FUZZ_TIMES)
+    settings.load_profile(TEST)
+
+
+def forget_our_constants() -> None:
+    """Keep hypothesis from trying the numbers that stand in the modules loaded so far.
+
+    An edit anywhere, or another order of the tests, would change the examples of all laws.
+    """
+    pytest.MonkeyPatch().setattr(providers, "is_local_module_file", lambda path: False)
+
+
+def examples(count: int) -> settings:
+    """Return the settings of a law that is worth another number of examples than most."""
+    return settings(max_examples=count * settings().max_examples // EXAMPLES)
