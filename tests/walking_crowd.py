@@ -15,7 +15,7 @@ WIDTH_PX, HEIGHT_PX = 1280, 720
 
 @dataclass(frozen=True, slots=True)
 class Crowd:
-    """What a camera saw of some people for ten seconds, every two of them: pictures of (time_s, (N, 4) boxes)."""
+    """What a camera saw of some people for ten seconds, every 2.5 s: (time_s, (N, 4) boxes)."""
 
     view: View
     pictures: list[tuple[float, FloatArray]]
@@ -68,7 +68,7 @@ def random_crowd(seed: int, *, clean: bool = False, people: int | None = None) -
     velocity_mps = rng.choice([0.0, 1.2], count)[:, None] * np.column_stack([np.cos(way), np.sin(way)])
     stoops = np.zeros(count) if clean else (rng.random(count) < 0.2)
     pictures = []
-    for time_s in np.arange(0.0, 10.1, 2.0):
+    for time_s in np.arange(0.0, 10.1, 2.5):
         boxes = []
         for who in range(count):
             tall = 0.65 if stoops[who] and (time_s + who) % 10.0 < 6.0 else 1.0

@@ -187,7 +187,9 @@ class CameraPrior:
     def unknown(cls, width_px: int, height_px: int) -> CameraPrior:
         """Return what can be said of any drone's camera."""
         focal_px = max(width_px, height_px) / 2.0 / np.tan(np.deg2rad(DRONE_FIELD_DEG / 2.0))
-        matrix = np.array([[focal_px, 0.0, (width_px - 1) / 2.0], [0.0, focal_px, (height_px - 1) / 2.0], [0.0, 0.0, 1.0]])
+        matrix = np.array(
+            [[focal_px, 0.0, (width_px - 1) / 2.0], [0.0, focal_px, (height_px - 1) / 2.0], [0.0, 0.0, 1.0]]
+        )
         camera = Camera(width_px, height_px, matrix, np.zeros(5))
         return cls(camera, focal_sigma=0.12, k1_sigma=0.06, origin="a drone's usual lens")
 

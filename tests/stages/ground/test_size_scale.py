@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from tolerances import CLEAN_CROWD_LOG, GEOMETRY_REL
 from walking_crowd import random_crowd
 
+from standoff.core import homography
 from standoff.core.camera import CameraPrior
 from standoff.core.homography import FloatArray
 from standoff.core.pose import View
@@ -30,7 +31,7 @@ def _scale(view: View | GroundMap, boxes: FloatArray = _BOXES, camera: CameraPri
 
 def _map(view: View, *, knows_lens: bool = True) -> GroundMap:
     camera = view.camera
-    image_to_ground = np.linalg.inv(view.plane_to_pinhole())
+    image_to_ground = homography.invert(view.plane_to_pinhole())
     size_px = (camera.width_px, camera.height_px)
     known = camera if knows_lens else None
     return GroundMap(image_to_ground, np.zeros((9, 9)), size_px, "test", 1.0, camera=known)
@@ -78,7 +79,8 @@ def test_repeated_boxes_of_one_person_count_as_one() -> None:
     workers = np.zeros(5, dtype=np.int64)
     scale = scale_from_sizes(_CROWD.view, boxes, workers, entity_id=workers)
     assert scale is not None
-    assert (scale.entities, scale.sigma) == (1, pytest.approx(_scale(_CROWD.view, boxes[:1]).sigma))
+    assert scale.entities == 1
+    assert scale.sigma == pytest.approx(_scale(_CROWD.view, boxes[:1]).sigma)
 
 
 def test_boxes_cut_off_by_the_picture_s_edge_say_nothing() -> None:
@@ -105,8 +107,15 @@ def test_machines_say_it_too_but_are_less_sure() -> None:
 
 @pytest.mark.parametrize(
     ("ratio", "sigma", "verdict"),
-    [(1.0, 0.1, "agrees"), (1.5, 0.1, "agrees"), (1.7, 0.1, "warning"), (0.5, 0.1, "warning"), (1.7, 0.4, "agrees")]
-    + [(4.5, 0.1, "refusal"), (0.2, 0.1, "refusal")],
+    [
+        (1.0, 0.1, "agrees"),
+        (1.5, 0.1, "agrees"),
+        (1.7, 0.1, "warning"),
+        (0.5, 0.1, "warning"),
+        (1.7, 0.4, "agrees"),
+        (4.5, 0.1, "refusal"),
+        (0.2, 0.1, "refusal"),
+    ],
 )
 def test_a_verdict_needs_a_large_factor_and_to_be_sure_of_it(ratio: float, sigma: float, verdict: str) -> None:
     assert SizeScale(ratio, sigma, 3).verdict == verdict

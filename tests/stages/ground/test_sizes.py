@@ -123,7 +123,7 @@ def test_a_moving_camera_says_where_it_is_now() -> None:
         place_m = view.position_m + np.array([0.2, 0.1, 0.15]) * step
         now = View.aimed(view.camera, place_m, heading_deg=0.5 * step, pitch_deg=pitch_deg + 0.2 * step)
         moved = now.plane_to_pinhole() @ np.linalg.inv(view.plane_to_pinhole())
-        bodies_m = [body_points(1.75, 1.35) + [*xy_m, 0.0] for xy_m in standing_m]
+        bodies_m = [body_points(1.75, 1.35) + np.append(xy_m, 0.0) for xy_m in standing_m]
         boxes = [box for box in (box_of(now, body_m) for body_m in bodies_m) if box is not None]
         motion = CameraMotion(moved, np.zeros((9, 9)), keyframe_s=0.0, camera=view.camera)
         answer = estimator.update(0.5 * step, _people(np.array(boxes)), motion)

@@ -108,7 +108,8 @@ def scale_from_sizes(
 ) -> SizeScale | None:
     """Compare the sizes of people and machines with what they should be, seen through a map of the ground.
 
-    Boxes that touch the picture's edge, or stand where the map sees no ground, are left out.
+    Boxes that touch the picture's edge, or stand where the map sees no ground, are left out. Give only boxes that a
+    detector is sure of: clutter that it takes for people is smaller than people.
 
     Args:
         ground: The map; of a `GroundMap` the camera's pose is derived.

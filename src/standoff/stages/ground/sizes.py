@@ -21,6 +21,9 @@ TOO_FEW = "too few people were seen standing at different places"
 NOT_A_PLANE = "the sizes of people do not fit one level ground"
 
 _EVERY_S = 0.45
+_LEAST_SCORE = 0.6
+"""Of a box that is taken for a person: below, clutter is as frequent as people (the shipped detector)."""
+
 _FEWEST_PLACES = 5
 _FEWEST_STANDING, _WIDEST_SCATTER = 0.5, 0.3
 _TURN_STEP = 1e-5
@@ -105,7 +108,7 @@ class SizesEstimator:
         if moved is None:
             self.reset()
             return self._answer
-        people = detections[detections.class_id == CLASS_BY_NAME["worker"].id]
+        people = detections[(detections.class_id == CLASS_BY_NAME["worker"].id) & (detections.score >= _LEAST_SCORE)]
         if len(people) == 0 or time_s - self._sampled_s < _EVERY_S:
             return self._answer
         self._sampled_s = time_s
