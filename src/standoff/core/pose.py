@@ -16,6 +16,7 @@ from typing import Self
 import numpy as np
 
 from standoff.core.camera import Camera
+from standoff.core.errors import GroundError
 from standoff.core.homography import FloatArray
 
 CHANGES = 8
@@ -212,3 +213,64 @@ def vector_from_rotation(rotation: FloatArray) -> FloatArray:
         return axis / 2.0
     vector: FloatArray = axis / (2.0 * sine) * np.arctan2(sine, cosine)
     return vector
+
+
+def poses_of_plane(plane_to_camera: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the poses whose view of the ground z = 0 is nearest to given homographies.
+
+    The first two columns of such a homography are the first two of the rotation, times a scale that both share.
+    Where they are not quite at right angles and equally long, the nearest two that are take their place.
+
+    Args:
+        plane_to_camera: (..., 3, 3) signed, from metres to normalised pinhole coordinates (x / z, y / z).
+
+    Returns:
+        (..., 3, 3) rotations site_to_camera and (..., 3) positions in the site frame; below the ground where the
+        homography is a mirror's.
+    """
+    columns = plane_to_camera[..., :2]
+    gram = np.swapaxes(columns, -1, -2) @ columns
+    product = np.sqrt(np.linalg.det(gram))[..., None, None]
+    both = np.sqrt(np.trace(gram, axis1=-2, axis2=-1)[..., None, None] + 2.0 * product)
+    # Of the 2 x 2 matrix G, (G + sqrt(det G) I) / sqrt(trace G + 2 sqrt(det G)) is the square root.
+    root = (gram + product * np.eye(2)) / both
+    axes = columns @ np.linalg.inv(root)
+    rotation = np.concatenate([axes, np.cross(axes[..., 0], axes[..., 1])[..., None]], axis=-1)
+    shift_m = plane_to_camera[..., 2] / (both[..., 0] / 2.0)
+    position_m: FloatArray = -np.einsum("...ji,...j->...i", rotation, shift_m)
+    return rotation, position_m
+
+
+def view_from_homography(image_to_ground: FloatArray, camera: Camera) -> View:
+    """Return where a known camera is, from its map of the ground.
+
+    Args:
+        image_to_ground: (3, 3) signed homography from undistorted pixels to metres, x east, y north seen from above.
+        camera: Lens; a homography that no pose of this camera explains exactly gives the nearest one.
+
+    Raises:
+        GroundError: No camera above the ground sees it so: the ground's axes are left-handed, or it is seen edge on.
+
+    >>> camera = Camera(200, 100, np.array([[90.0, 0.0, 100.0], [0.0, 90.0, 50.0], [0.0, 0.0, 1.0]]), np.zeros(5))
+    >>> view = View.aimed(camera, np.array([1.0, 2.0, 30.0]), heading_deg=10.0, pitch_deg=50.0)
+    >>> view_from_homography(np.linalg.inv(view.plane_to_pinhole()), camera).position_m.round(9).tolist()
+    [1.0, 2.0, 30.0]
+    """
+    try:
+        plane_to_camera = np.linalg.inv(camera.matrix) @ np.linalg.inv(image_to_ground)
+        rotation, position_m = poses_of_plane(plane_to_camera)
+    except np.linalg.LinAlgError as error:
+        raise _no_view("a matrix that has no inverse") from error
+    if not np.isfinite(rotation).all() or not np.isfinite(position_m).all():
+        raise _no_view("a plane seen edge on")
+    if position_m[2] <= 0:
+        raise _no_view("the ground seen from below, as in a mirror")
+    return View(camera, position_m, rotation)
+
+
+def _no_view(found: str) -> GroundError:
+    return GroundError(
+        expected="a map of ground that a camera above it sees",
+        found=found,
+        fix="give x and y of the ground so that y is to the left of x, seen from above",
+    )
