@@ -37,6 +37,19 @@ class Carried:
     added: FloatArray
 
 
+def since(earlier: CameraMotion, later: CameraMotion) -> CameraMotion:
+    """Return the motion from one frame to a later one, both known since the same keyframe.
+
+    The errors of both count in full, though they have causes in common: it is rather too large.
+    """
+    back = homography.invert(earlier.keyframe_to_image)
+    step = later.keyframe_to_image @ back
+    by_later, by_earlier = np.kron(np.eye(3), back.T), -np.kron(step, back.T)
+    covariance = by_later @ later.covariance @ by_later.T + by_earlier @ earlier.covariance @ by_earlier.T
+    norm = np.linalg.norm(step)
+    return CameraMotion(step / norm, covariance / norm**2, earlier.keyframe_s, later.camera, later.repeated)
+
+
 def carry(key: View, motion: CameraMotion, guess: View) -> Carried | None:
     """Find where the camera is after the picture of the ground has moved.
 

@@ -203,7 +203,7 @@ class FusedGround:
     def _begin(self, found: Found, time_s: float) -> None:
         belief = found.belief()
         belief = turned_like(belief, self._shape, last=self._last, corner_px=self._hint())
-        self._filter.start(belief, time_s)
+        self._filter.start(belief, time_s, height_known=self._given_height_m is not None)
         self._refused_since_s = None
         self._noted(belief.state)
 

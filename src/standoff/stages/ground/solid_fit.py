@@ -16,7 +16,7 @@ from standoff.stages.ground.solid_edges import Blurred, Looks, look_across
 
 _ROUNDS, _SETTLED = 6, 4
 _LEAST_GATE_PX = 2.0
-_SUPPORT_PX = 1.2
+_SUPPORT_PX = 0.7
 _MIN_SCATTER_PX = 0.15
 _CORRELATED = 6.0
 """Samples next to each other share blur, stains and shadows: so many count as one independent observation."""
@@ -24,7 +24,7 @@ _CORRELATED = 6.0
 _EDGE_SIGMA_PX = 0.12
 """No edge is known better than this, whatever its samples' scatter: lens blur, shading and compression pull it."""
 
-_PATCHY_PX = 2.0
+_PATCHY_PX = 4.0
 """An edge of which hardly anything agrees may be something else's, off by about so much; one that is whole is not."""
 
 _WORTH_SETTLING_PX, _DOUBT_LEFT = 0.2, 0.5
