@@ -76,9 +76,8 @@ def carry(key: View, motion: CameraMotion, guess: View) -> Carried | None:
         if not np.isfinite(misfit).all():
             return None
         pose = by_view[:, :, POSE].reshape(-1, 6)
-        solve = np.linalg.pinv(pose)
         change = np.zeros(8)
-        change[POSE] = solve @ misfit
+        change[POSE] = np.linalg.pinv(pose) @ misfit
         now = now.changed(change)
         if np.abs(change).max() < 1e-7:
             break
@@ -87,7 +86,7 @@ def carry(key: View, motion: CameraMotion, guess: View) -> Carried | None:
     rms_px = float(np.sqrt((misfit**2).mean()))
     if not rms_px < _MAX_MISFIT_PX:
         return None
-    solve = np.linalg.pinv(by_view[:, :, POSE].reshape(-1, 6))
+    solve = np.asarray(np.linalg.pinv(by_view[:, :, POSE].reshape(-1, 6)), dtype=np.float64)
     return Carried(
         view=View(key.camera, now.position_m, now.site_to_camera),
         by_key=_by_key(then, places, by_view, by_point, solve, lens_known=motion.camera is not None),

@@ -55,7 +55,7 @@ class Estimate:
 
     def belief(self) -> Belief:
         """Return it as a prior for a fit."""
-        return Belief(self.state, np.linalg.inv(self.covariance))
+        return Belief(self.state, _inverse(self.covariance))
 
 
 class PoseFilter:
@@ -68,7 +68,7 @@ class PoseFilter:
         self._now_s = 0.0
         self._by_key = np.eye(STATE)
         self._motion: CameraMotion | NoCameraMotion = NoCameraMotion("not yet")
-        self._key_motion = self._motion
+        self._key_motion: CameraMotion | NoCameraMotion = self._motion
         self._observed_s = -np.inf
         self._lasting_trace = np.inf
         self._same_s, self._lasting_share = _SAME_S, _LASTING_SHARE
@@ -86,7 +86,7 @@ class PoseFilter:
 
     def start(self, belief: Belief, time_s: float, *, height_known: bool = True) -> None:
         """Begin, or begin again, with a belief about this frame; say whether the height was measured by hand."""
-        covariance = np.linalg.inv(belief.information)
+        covariance = _inverse(belief.information)
         lens_sure = covariance[6, 6] < _SURE_FOCAL_SIGMA**2
         self._height_doubt_m2 = np.zeros((STATE, STATE))
         if not height_known:
@@ -137,9 +137,9 @@ class PoseFilter:
         """
         assert self._key is not None and self._now is not None, "predicted first"
         fresh = min(max((self._now_s - self._observed_s) / self._same_s, 0.0), 1.0)
-        before = np.linalg.inv(self._now.covariance)
+        before = _inverse(self._now.covariance)
         pull = (before + information) @ state.change_from(self._now.state)
-        covariance = np.linalg.inv(before + fresh * information)
+        covariance = _inverse(before + fresh * information)
         change = fresh * (covariance @ pull)
         gain = self._key.covariance @ self._by_key.T @ before
         key_covariance = self._key.covariance + gain @ (covariance - self._now.covariance) @ gain.T
@@ -194,6 +194,10 @@ class PoseFilter:
         sigma = np.array([_FLIGHT_RADPS] * 3 + [_FLIGHT_MPS] * 3 + [0.0] * 3) * seconds
         covariance = self._now.covariance + np.diag(sigma**2)
         self._now = Estimate(self._now.state, covariance, self._now.lasting)
+
+
+def _inverse(matrix: FloatArray) -> FloatArray:
+    return np.asarray(np.linalg.inv(matrix), dtype=np.float64)
 
 
 def _same_time(first_s: float, second_s: float) -> bool:
