@@ -42,7 +42,7 @@ _MAX_ROLL_RAD = np.deg2rad(30.0)
 _MIN_PITCH_RAD = np.deg2rad(5.0)
 _BARE_COST, _ROLL_COST, _PATCHY = 0.45, 0.1, 0.33
 _REFINED = 4
-_FIT_PX = 4.0
+_FIT_PX = 5.0
 _RIVAL_SCORE, _RIVAL_PX = 0.9, 4.0
 _MIN_SIDE_SUPPORT, _MIN_MEAN_SUPPORT, _MIN_OTHER_SUPPORT = 0.5, 0.8, 0.85
 """So much of the sides must be seen when nothing else says that the reference is there."""
