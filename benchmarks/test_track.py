@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from standoff.core.types import Detections
+from standoff.core.types import Detections, NoCameraMotion
 from standoff.stages.track import Tracker, TrackParams
+
+STILL = NoCameraMotion("not estimated")
 
 ENTITIES = 30
 FRAMES = 200
@@ -36,7 +38,7 @@ def test_standoff(benchmark: BenchmarkFixture) -> None:
 
     def follow() -> int:
         tracker = Tracker()
-        return sum(len(tracker.update(index / FRAMES_PER_S, seen)) for index, seen in enumerate(frames))
+        return sum(len(tracker.update(index / FRAMES_PER_S, seen, STILL)) for index, seen in enumerate(frames))
 
     assert benchmark(follow) > 0.9 * ENTITIES * FRAMES
 

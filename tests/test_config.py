@@ -46,6 +46,13 @@ def test_paths_in_a_settings_file_are_relative_to_the_file(tmp_path: Path) -> No
     assert settings.ground.camera == Path("/abs/camera.yaml")
 
 
+def test_telemetry_is_a_file_beside_the_settings_or_none(tmp_path: Path) -> None:
+    assert load_settings(write(tmp_path, "telemetry: flight.srt\n")).telemetry == tmp_path / "flight.srt"
+    assert load_settings(write(tmp_path, "telemetry: none\n")).telemetry == "none"
+    assert load_settings(None, {"telemetry": "none"}).telemetry == "none"
+    assert load_settings().telemetry is None
+
+
 def test_the_command_line_wins_over_the_environment_and_that_over_the_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

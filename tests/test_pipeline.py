@@ -6,12 +6,22 @@ import numpy as np
 import pytest
 
 from standoff.core.errors import SourceTruncated
-from standoff.core.types import Detections, Frame, FrameResult, GroundMap, NoGroundMap, Outcome
+from standoff.core.types import (
+    CameraMotion,
+    Detections,
+    Frame,
+    FrameResult,
+    GroundMap,
+    NoCameraMotion,
+    NoGroundMap,
+    Outcome,
+)
 from standoff.pipeline import Pipeline
 from standoff.stages.frames import frame_from_array
 from standoff.stages.ground import Unmapped
 from standoff.stages.hazard import HazardMonitor
 from standoff.stages.locate import Locator
+from standoff.stages.motion import MotionEstimator
 from standoff.stages.proximity import ProximityMeter
 from standoff.stages.track import Tracker
 
@@ -49,7 +59,9 @@ class TwoWalkers:
 class MetreGround:
     """Ten pixels are a metre, everywhere."""
 
-    def update(self, frame: Frame, detections: Detections) -> GroundMap | NoGroundMap:
+    def update(
+        self, frame: Frame, detections: Detections, motion: CameraMotion | NoCameraMotion
+    ) -> GroundMap | NoGroundMap:
         matrix = np.diag([0.1, 0.1, 1.0])
         return GroundMap(matrix, np.zeros((9, 9)), frame.size_px, "test", 0.1)
 
@@ -65,6 +77,7 @@ def pipeline(source: Iterator[Frame], *sinks: Memory, detect_every: int = 1, map
     return Pipeline(
         frames=source,
         detector=TwoWalkers(),
+        motion=MotionEstimator(),
         ground=MetreGround() if mapped else Unmapped(),
         tracker=Tracker(),
         locator=Locator(),
@@ -87,7 +100,7 @@ def test_every_frame_reaches_every_sink_with_the_time_of_each_stage() -> None:
     assert (
         [result.frame.index for result in memory.results] == [result.frame.index for result in results] == [*range(5)]
     )
-    stages = {"frames", "detect", "ground", "track", "locate", "proximity", "hazard", "sinks.sink0"}
+    stages = {"frames", "detect", "motion", "ground", "track", "locate", "proximity", "hazard", "sinks.sink0"}
     assert set(results[0].stage_ms) == stages
     assert memory.outcomes[0].status == "complete"
 
@@ -101,6 +114,22 @@ def test_tracks_coast_and_say_so_while_the_detector_rests() -> None:
     for result in results[3:]:
         assert len(result.tracks) == 2
         assert (result.tracks.observed == result.detected).all()
+
+
+class Weary(TwoWalkers):
+    """A detector that rests on every other frame, of its own accord."""
+
+    def rests(self, frame: Frame) -> bool:
+        return frame.index % 2 == 1
+
+
+def test_tracks_coast_where_the_detector_itself_rests() -> None:
+    monitored = pipeline(frames(9))
+    monitored.detector = Weary()
+    results = list(monitored.run())
+    assert [result.detected for result in results] == [frame % 2 == 0 for frame in range(9)]
+    assert monitored.detector.calls == 5
+    assert not any(result.tracks.observed.any() for result in results[1::2])
 
 
 def test_without_a_map_every_pair_is_there_and_none_is_measured() -> None:

@@ -13,11 +13,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from standoff.clips import DETECTIONS_FILE
 from standoff.config import Settings, build_pipeline, build_replacement, resolved
 from standoff.core.errors import OutputError
 from standoff.core.protocols import Ground
 from standoff.core.types import FrameResult, Sink
 from standoff.pipeline import Pipeline
+from standoff.stages.detect import RecordedDetector
 from standoff.stages.frames import Source, open_source
 from standoff.stages.sinks import (
     FRAMES,
@@ -29,6 +31,7 @@ from standoff.stages.sinks import (
     ReportSink,
     TableSink,
     VideoSink,
+    detections_table,
     prepare_output,
 )
 
@@ -69,19 +72,28 @@ def open_run(source: Path | str, out: Path | str, settings: Settings, *, overwri
     Raises:
         StandoffError: A source, model, survey, camera, setting or folder that cannot be used.
     """
-    _refuse_own_source(Path(source).resolve(), Path(out).resolve())
+    _refuse_to_replace(Path(source).resolve(), Path(out).resolve(), "the source")
+    if settings.detections is not None:
+        _refuse_to_replace(settings.detections.resolve(), Path(out).resolve(), "the recorded detections")
     frames = open_source(
-        source, start_s=settings.start_s, stop_s=settings.stop_s, every=settings.every, fps=settings.fps
+        source,
+        start_s=settings.start_s,
+        stop_s=settings.stop_s,
+        every=settings.every,
+        fps=settings.fps,
+        telemetry=settings.telemetry,
     )
-    pipeline = build_pipeline(settings, frames)
+    pipeline = build_pipeline(settings, frames, frames.camera_prior)
     if (check_size := getattr(pipeline.ground, "check_size", None)) is not None:
         check_size(frames.size_px)
+    if isinstance(pipeline.detector, RecordedDetector):
+        pipeline.detector.check_source(frames.description)
     descriptions = {
         "settings": resolved(settings),
         "source": frames.description,
         "model": getattr(pipeline.detector, "description", None),
         "ground": getattr(pipeline.ground, "description", None),
-        "warnings": ground_warnings(pipeline.ground),
+        "warnings": [*frames.warnings, *ground_warnings(pipeline.ground)],
     }
     extra = {name: build_replacement(name, replacement) for name, replacement in settings.extra_outputs.items()}
     folder = prepare_output(out, overwrite=overwrite)
@@ -96,11 +108,11 @@ def ground_warnings(ground: Ground) -> list[str]:
     return list(getattr(ground, "description", {}).get("warnings", ()))
 
 
-def _refuse_own_source(source: Path, out: Path) -> None:
-    """Raise OutputError where the outputs would replace the source, or lie among its pictures."""
+def _refuse_to_replace(source: Path, out: Path, what: str) -> None:
+    """Raise OutputError where the outputs would replace what is read, or lie among its pictures."""
     if source == out or (source.parent == out and source.name in OUTPUT_FILES):
         raise OutputError(
-            expected="outputs apart from the source", found=f"{source} and {out}", fix="choose another output folder"
+            expected=f"outputs apart from {what}", found=f"{source} and {out}", fix="choose another output folder"
         )
 
 
@@ -110,6 +122,11 @@ def build_sinks(settings: Settings, folder: Path, descriptions: dict[str, Any]) 
         "tracks": lambda: TableSink(folder / "tracks.parquet", TRACKS, settings.tables),
         "proximity": lambda: TableSink(folder / "proximity.parquet", PROXIMITY, settings.tables),
         "frames": lambda: TableSink(folder / "frames.parquet", FRAMES, settings.tables),
+        "detections": lambda: TableSink(
+            folder / DETECTIONS_FILE,
+            detections_table(descriptions["source"], descriptions["model"]),
+            settings.tables,
+        ),
         "hazards": lambda: HazardSink(folder / "hazards.jsonl"),
         "video": lambda: VideoSink(folder / "annotated.mp4", settings.video),
         "report": lambda: ReportSink(

@@ -8,7 +8,16 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from time import perf_counter
 
-from standoff.core.protocols import Detector, Ground, HazardMonitor, Locator, ProximityMeter, Tracker
+from standoff.core.protocols import (
+    CameraMotionEstimator,
+    Detector,
+    Ground,
+    HazardMonitor,
+    Locator,
+    ProximityMeter,
+    RestingDetector,
+    Tracker,
+)
 from standoff.core.types import Detections, Frame, FrameResult, Hazard, Outcome, Sink
 
 _LOG = logging.getLogger(__name__)
@@ -27,7 +36,8 @@ class Pipeline:
 
     Attributes:
         frames: The source.
-        detector: Runs on every `detect_every`-th frame; tracks coast in between.
+        detector: Runs on every `detect_every`-th frame, unless it rests there; tracks coast in between.
+        motion: Reads every frame.
         ground: Reads every frame.
         sinks: By name. One that fails is logged and left out from then on; the others go on.
         sink_errors: Message of each sink that failed.
@@ -35,6 +45,7 @@ class Pipeline:
 
     frames: Iterable[Frame]
     detector: Detector
+    motion: CameraMotionEstimator
     ground: Ground
     tracker: Tracker
     locator: Locator
@@ -76,20 +87,28 @@ class Pipeline:
     def step(self, frame: Frame, stage_ms: dict[str, float], *, detect: bool = True) -> FrameResult:
         """Take one frame through all stages; add each stage's milliseconds to `stage_ms`."""
         detections = Detections.empty()
+        if detect and isinstance(self.detector, RestingDetector):
+            detect = not self.detector.rests(frame)
         if detect:
             with _clocked(stage_ms, "detect"):
                 detections = self.detector.detect(frame)
+        with _clocked(stage_ms, "motion"):
+            motion = self.motion.update(frame, detections)
         with _clocked(stage_ms, "ground"):
-            ground = self.ground.update(frame, detections)
+            ground = self.ground.update(frame, detections, motion)
         with _clocked(stage_ms, "track"):
-            tracks = self.tracker.update(frame.time_s, detections) if detect else self.tracker.coast(frame.time_s)
+            tracks = (
+                self.tracker.update(frame.time_s, detections, motion)
+                if detect
+                else self.tracker.coast(frame.time_s, motion)
+            )
         with _clocked(stage_ms, "locate"):
             positions = self.locator.update(frame.time_s, tracks, ground)
         with _clocked(stage_ms, "proximity"):
             proximities = self.proximity.update(frame.time_s, positions, ground)
         with _clocked(stage_ms, "hazard"):
             hazards = self.hazard.update(frame.time_s, positions, proximities, ground)
-        return FrameResult(frame, detections, detect, ground, tracks, positions, proximities, hazards, stage_ms)
+        return FrameResult(frame, detections, detect, motion, ground, tracks, positions, proximities, hazards, stage_ms)
 
     def _write(self, result: FrameResult, stage_ms: dict[str, float]) -> None:
         for name, sink in self.sinks.items():

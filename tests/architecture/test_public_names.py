@@ -11,9 +11,13 @@ import pytest
 PUBLIC_NAMES = {
     "standoff.stages.frames": {"ArrayPicture", "AvPicture", "Scaler", "Source", "frame_from_array", "open_source"},
     "standoff.stages.detect": {
-        "DEFAULT_CLASS_MAP", "SHIPPED_MODELS", "DetectParams", "OnnxDetector", "ShippedModel", "available_providers",
-        "find_model",
+        "DEFAULT_CLASS_MAP", "SHIPPED_MODELS", "DetectParams", "OnnxDetector", "RecordedDetector", "ShippedModel",
+        "available_providers", "find_model",
     },
+    "standoff.clips": {
+        "COLUMNS", "DETECTIONS_FILE", "RecordedDetections", "is_recording", "metadata_of", "read_detections",
+    },
+    "standoff.stages.motion": {"MotionEstimator", "MotionParams"},
     "standoff.stages.track": {"TrackParams", "Tracker"},
     "standoff.stages.locate": {"LocateParams", "Locator"},
     "standoff.stages.proximity": {"ProximityMeter", "ProximityParams", "side_classes"},
@@ -22,7 +26,7 @@ PUBLIC_NAMES = {
     "standoff.simulation.behaviour": {
         "carrying_between", "crossing_behind", "digging", "dozing", "driving_through", "grading", "idle",
         "keep_distance", "loader_loading", "near_miss", "pair_talking", "random_stance", "rolling", "spreading",
-        "standing_working", "truck_loading", "walking_past",
+        "standing_working", "stooping", "truck_loading", "walking_past",
     },
 }  # fmt: skip
 

@@ -19,9 +19,13 @@ from cli.calling import Call
 from pages import PageReader
 
 from standoff.core.errors import GroundError
+from standoff.core.protocols import AnyMotion
 from standoff.core.types import Detections, Frame, NoGroundMap
 
-OUTPUTS = {"run.json", "tracks.parquet", "proximity.parquet", "frames.parquet", "hazards.jsonl", "annotated.mp4"}
+OUTPUTS = {
+    "run.json", "tracks.parquet", "proximity.parquet", "frames.parquet", "detections.parquet", "hazards.jsonl",
+    "annotated.mp4",
+}  # fmt: skip
 
 
 class Approach:
@@ -68,6 +72,33 @@ def test_a_run_writes_every_output_and_finds_the_hazard(call: Call, video: Path,
     assert record["status"] == "complete"
     assert record["counts"]["frames"] == record["counts"]["frames_with_map"] == 34
     assert record["settings"]["locate"]["radius_m"] == {"worker": 1.0, "excavator": 3.0}
+
+
+def test_the_record_says_which_telemetry_was_used_and_where_it_does_not_fit(
+    call: Call, video: Path, site: Path, tmp_path: Path
+) -> None:
+    readings = "HOME(9.0,45.0)\nGPS(9.0,45.0,9) BAROMETER:30.0\n\n"
+    blocks = (f"{k}\n00:00:0{k},000 --> 00:00:0{k + 1},000\n{readings}" for k in (0, 1))
+    (tmp_path / "site.srt").write_text("".join(blocks), encoding="utf-8")
+    options = ("--config", site, "--outputs", "frames", "--overwrite", "--out", tmp_path / "out")
+    code, _, err = call("run", video, *options)
+    record = json.loads((tmp_path / "out" / "run.json").read_text(encoding="utf-8"))
+    assert (code, err) == (0, "")
+    assert record["source"]["telemetry"]["origin"] == "site.srt"
+    assert record["source"]["telemetry"]["readings"] == ["height_m", "latitude_deg", "longitude_deg"]
+    video.rename(tmp_path / "other.mp4")
+    make_video(tmp_path / "site.mp4", 60)
+    code, _, err = call("run", video, *options)
+    record = json.loads((tmp_path / "out" / "run.json").read_text(encoding="utf-8"))
+    warning = "site.srt: it covers 0.0 to 2.0 s of a film of 6.0 s"
+    assert (code, err) == (0, f"standoff: warning: {warning}\n")
+    assert record["warnings"] == [warning]
+    code, _, err = call("run", video, *options, "--telemetry", "none")
+    record = json.loads((tmp_path / "out" / "run.json").read_text(encoding="utf-8"))
+    assert (code, err, record["source"]["telemetry"]) == (0, "", {"origin": "none"})
+    code, _, err = call("run", video, *options, "--telemetry", site)
+    assert code == 2
+    assert "site.yaml is not used" in err
 
 
 def test_json_prints_the_record_and_nothing_else(call: Call, video: Path, site: Path, tmp_path: Path) -> None:
@@ -197,7 +228,7 @@ def test_a_truncated_video_keeps_what_was_read_and_says_that_it_is_not_all(
 class Unplugged:
     """A ground stage whose sensor is not there."""
 
-    def update(self, frame: Frame, detections: Detections) -> NoGroundMap:
+    def update(self, frame: Frame, detections: Detections, motion: AnyMotion) -> NoGroundMap:
         raise GroundError(expected="a sensor", found="none", fix="plug it in")
 
 

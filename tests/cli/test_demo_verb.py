@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from cli.calling import Call
 from evaluation.paper import drawn_clip
+from evaluation.paper.test_paper_recorded import record_truth
 
 from standoff.evaluation.paper import Clip, load_clip
 from standoff.evaluation.paper.truth_detector import TrueBoxes
@@ -44,6 +45,17 @@ def test_machines_get_only_json(drawn: Clip, tmp_path: Path, call: Call) -> None
     code, said, _ = call("demo", "--out", tmp_path / "out", "--json", "-")
     assert code == 0
     assert json.loads(said)["frames"] == drawn.frame_count
+
+
+def test_an_earlier_demo_can_be_replayed(
+    drawn: Clip, tmp_path: Path, call: Call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first = record_truth(drawn.folder, tmp_path / "first")
+    monkeypatch.setattr("standoff.config.build.OnnxDetector", None)
+    words = ("demo", "--out", tmp_path / "again", "--detections", first, "--json", "-")
+    code, said, _ = call(*words)
+    assert (code, json.loads(said)["frames"]) == (0, drawn.frame_count)
+    assert call(*words, "--model", "site")[0] == 2
 
 
 def test_an_earlier_run_is_kept_unless_it_may_be_replaced(drawn: Clip, tmp_path: Path, call: Call) -> None:

@@ -49,6 +49,8 @@ def test_without_anything_it_explains_itself(call: Call) -> None:
         ("mobile", "--fps", 0),
         ("mobile", "--altitude", 3),
         ("mobile", "--pitch", 95),
+        ("mobile", "--stature", 0.9),
+        ("mobile", "--stooping", 1.5),
         ("dataset", "--images", 1, "--size", "160x91"),
         ("dataset", "--images", 1, "--seed", MAX_SEED + 1),
     ],
@@ -94,6 +96,17 @@ def test_a_clip_appears_silently_and_is_replaced_only_when_asked(opengl: None, c
     assert (tmp_path / "clip" / "truth.parquet").read_bytes() == before
     assert call(*words, "--seed", 1, "--overwrite")[0] == 0
     assert (tmp_path / "clip" / "truth.parquet").read_bytes() != before
+
+
+def test_the_truth_alone_needs_no_opengl_and_says_what_it_is(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delattr(moderngl, "create_context")
+    monkeypatch.delattr(moderngl, "create_standalone_context")
+    code, out, err = call("simulate", "virtual", "--truth-only", "--out", tmp_path / "clip", *_CLIP)
+    assert code == 0 and "without pictures" in out and err == ""
+    assert (tmp_path / "clip" / "detections.parquet").is_file()
+    assert not (tmp_path / "clip" / "video.mp4").exists()
 
 
 @pytest.mark.parametrize("layout", ["yolo", "coco"])

@@ -9,8 +9,9 @@ from tolerances import DISTORTION_PX, GEOMETRY_REL
 
 from standoff.core import homography
 from standoff.core.camera import Camera
+from standoff.core.errors import GroundError
 from standoff.core.homography import FloatArray
-from standoff.core.pose import View
+from standoff.core.pose import View, view_from_homography
 
 _CAMERA = Camera(
     1920,
@@ -96,3 +97,26 @@ def test_a_matrix_that_is_no_rotation_is_refused() -> None:
         View(_CAMERA, np.zeros(3), np.diag([1.0, 1.0, -1.0]))
     with pytest.raises(ValueError, match=r"\(3,\)"):
         View(_CAMERA, np.zeros(2), np.eye(3))
+
+
+@given(st.integers(0, 10_000), st.floats(0.01, 100.0))
+def test_a_map_of_the_ground_gives_the_camera_s_pose_back(seed: int, scale: float) -> None:
+    view = _view(seed)
+    found = view_from_homography(scale * homography.invert(view.plane_to_pinhole()), _CAMERA)
+    np.testing.assert_allclose(found.position_m, view.position_m, rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(found.site_to_camera, view.site_to_camera, atol=1e-7)
+
+
+def test_a_disturbed_map_gives_the_nearest_pose_and_a_rotation() -> None:
+    view = _view(1)
+    disturbed = homography.invert(view.plane_to_pinhole()) @ np.diag([1.01, 0.99, 1.0])
+    found = view_from_homography(disturbed, _CAMERA)
+    assert np.linalg.norm(found.position_m - view.position_m) < 0.1 * np.linalg.norm(view.position_m)
+
+
+def test_maps_that_no_camera_above_the_ground_has_are_refused() -> None:
+    image_to_ground = homography.invert(_view(1).plane_to_pinhole())
+    with pytest.raises(GroundError, match="below"):
+        view_from_homography(np.diag([-1.0, 1.0, 1.0]) @ image_to_ground, _CAMERA)
+    with pytest.raises(GroundError, match="inverse"):
+        view_from_homography(np.zeros((3, 3)), _CAMERA)

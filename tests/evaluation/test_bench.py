@@ -20,6 +20,7 @@ from standoff.evaluation.timing import Baseline, Spread, StageTimes, collect_tim
 from standoff.pipeline import Pipeline
 from standoff.stages.hazard import HazardMonitor
 from standoff.stages.locate import Locator
+from standoff.stages.motion import MotionEstimator
 from standoff.stages.proximity import ProximityMeter
 from standoff.stages.track import Tracker
 
@@ -30,6 +31,7 @@ def pipeline(site: Site, kind: Literal["surveyed", "reference"], frames: int = 2
     return Pipeline(
         frames=site.frames(frames),
         detector=ScriptedDetector(site),
+        motion=MotionEstimator(),
         ground=site.ground(kind),
         tracker=Tracker(),
         locator=Locator(),

@@ -20,6 +20,7 @@ from standoff.cli import (
     export,
     join,
     label,
+    marker,
     quantize,
     run,
     simulate,
@@ -42,6 +43,7 @@ app.command("export")(export.export)
 app.command("quantize")(quantize.quantize)
 app.command("label")(label.label)
 app.command("calibrate")(calibrate.calibrate)
+app.command("marker")(marker.marker)
 app.add_typer(evaluate.app, name="evaluate")
 app.add_typer(config.app, name="config")
 app.add_typer(simulate.app, name="simulate")

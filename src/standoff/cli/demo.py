@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from standoff.cli.run import exit_status, tell, watch
+from standoff.cli.run import detector_overrides, exit_status, tell, watch
 from standoff.core.errors import DataError
 
 if TYPE_CHECKING:
@@ -22,7 +22,12 @@ _BOX_MARGIN = 0.06
 
 def demo(
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the outputs.")] = Path("demo"),
-    model: Annotated[str, typer.Option(help="Detector: site or site-int8 (ours), or an ONNX file.")] = "site",
+    model: Annotated[
+        str | None, typer.Option(help="Detector: site (the default) or site-int8 (ours), or an ONNX file.")
+    ] = None,
+    detections: Annotated[
+        Path | None, typer.Option(help="Replay the detections of an earlier demo: its folder, or its table.")
+    ] = None,
     json_file: Annotated[
         Path | None, typer.Option("--json", help="Also write the comparison as JSON; - prints only that.")
     ] = None,
@@ -43,7 +48,7 @@ def demo(
         "ground": {"reference": {"params": {"method": "paper", "box_margin": _BOX_MARGIN}}},
         "locate": {"anchor": "box_centre"},
     }
-    settings = load_settings(clip.folder / "reference.yaml", {"model": model, **paper})
+    settings = load_settings(clip.folder / "reference.yaml", {**detector_overrides(model, detections), **paper})
     run = open_run(clip.video, out, settings, overwrite=overwrite)
     witness = ClipWitness(clip, settings, run.source.size_px)
     watch(run, quiet=quiet, on_result=witness.take)

@@ -27,7 +27,11 @@ def paper(
         "paper"
     ),
     detector: Annotated[
-        str, typer.Option(help="truth (the true boxes), noisy (the same with errors), or a model: site, ONNX.")
+        str,
+        typer.Option(
+            help="truth (the true boxes), noisy (the same with errors), a model (site, ONNX), or a run of the clip "
+            "whose detections are replayed (its folder, or its table)."
+        ),
     ] = "truth",
     anchor: Annotated[
         Anchor | None,
@@ -83,12 +87,15 @@ def _detector(text: str) -> Boxes | Path:
         return "truth"
     if text == "noisy":
         return "noisy"
+    from standoff.clips import is_recording
     from standoff.stages.detect import find_model
 
     path = find_model(text)
-    if not path.is_file():
+    if not path.is_file() and not is_recording(path):
         raise ConfigError(
-            expected="--detector truth, noisy, or a model file", found=repr(text), fix="check the word or the path"
+            expected="--detector truth, noisy, a model file, or a run's folder",
+            found=repr(text),
+            fix="check the word or the path",
         )
     return path
 

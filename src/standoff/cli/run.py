@@ -33,19 +33,53 @@ def _numbers(text: str, count: int, option: str) -> tuple[float, ...]:
     return numbers
 
 
+def _shape_overrides(ground: str) -> dict[str, Any] | None:
+    """Translate `square:SIDE` and `rectangle:LENGTH,WIDTH`, each with `,height=H` or without, into settings."""
+    kind, _, rest = ground.partition(":")
+    count = {"square": 1, "rectangle": 2}.get(kind)
+    if count is None:
+        return None
+    lengths, _, height = rest.partition(",height=")
+    option = f"--ground {kind}:{'SIDE' if count == 1 else 'LENGTH,WIDTH'}"
+    numbers = _numbers(lengths, count, option)
+    # The file's reference may have another shape; its box and method go on.
+    shape: dict[str, Any] = dict.fromkeys(("square_m", "rectangle_m", "sides_m", "diagonal_m", "corners_m", "height_m"))
+    shape[f"{kind}_m"] = numbers[0] if count == 1 else numbers
+    if height:
+        shape["height_m"] = _numbers(height, 1, f"{option},height=H")[0]
+    return shape
+
+
+def _marker_override(text: str) -> dict[str, Any]:
+    """Read `marker:SIZE` or `marker:SIZE,id=ID` into settings of the only marker, which defines the site frame."""
+    size, *words = text.removeprefix("marker:").split(",")
+    size_m = _numbers(size, 1, "--ground marker:SIZE")[0]
+    marker: dict[str, Any] = {"size_m": size_m}
+    for word in words:
+        name, _, value = word.strip().partition("=")
+        if name != "id" or not value.isdecimal() or len(words) > 1:
+            raise ConfigError(
+                expected="--ground marker:SIZE or marker:SIZE,id=ID",
+                found=repr(text),
+                fix="write for example marker:1.2,id=3",
+            )
+        marker["id"] = int(value)
+    return {"markers": [marker], "survey": None, "reference": None}
+
+
 def _ground_overrides(ground: str | None, box: str | None, camera: Path | None) -> dict[str, Any]:
     """Translate `--ground`, `--reference-box` and `--camera` into settings."""
     overrides: dict[str, Any] = {}
-    if ground is not None and ground.startswith("square:"):
-        # The file's reference may have another shape; its box and method go on.
-        others = dict.fromkeys(("rectangle_m", "sides_m", "diagonal_m", "corners_m"))
-        side_m = _numbers(ground.removeprefix("square:"), 1, "--ground square:SIDE")[0]
-        overrides["reference"] = {"square_m": side_m, **others}
-        overrides["survey"] = None
+    if ground is not None and ground.startswith("marker:"):
+        overrides |= _marker_override(ground)
     elif ground == "none":
         overrides |= {"survey": None, "reference": None}
     elif ground is not None:
-        overrides |= {"survey": ground, "reference": None}
+        shape = _shape_overrides(ground)
+        overrides |= {"survey": None if shape else ground, "reference": shape}
+    if ground is not None:
+        # What the command line names is the ground; the file's markers may lie in another frame.
+        overrides.setdefault("markers", [])
     if box is not None:
         overrides.setdefault("reference", {})
         if overrides["reference"] is None:
@@ -60,26 +94,53 @@ def _ground_overrides(ground: str | None, box: str | None, camera: Path | None) 
     return overrides
 
 
+def detector_overrides(model: str | None, detections: Path | None) -> dict[str, Any]:
+    """Translate `--model` and `--detections` into settings; either wins over what a settings file says of both.
+
+    Raises:
+        ConfigError: Both are given.
+    """
+    if model is not None and detections is not None:
+        raise ConfigError(
+            expected="--model or --detections", found="both", fix="leave one out: a replay runs no detector"
+        )
+    if detections is not None:
+        return {"detections": str(detections)}
+    return {} if model is None else {"model": model, "detections": None}
+
+
 def run(
     source: Annotated[Path, typer.Argument(help="Video file, or a folder of pictures.", show_default=False)],
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the outputs.", show_default=False)],
     config: Annotated[Path | None, typer.Option(help="Settings, YAML (see `standoff config show`).")] = None,
     model: Annotated[str | None, typer.Option(help="Detector: site (ours, the default), or an ONNX file.")] = None,
+    detections: Annotated[
+        Path | None,
+        typer.Option(help="Replay the detections of an earlier run of this source: its folder, or its table."),
+    ] = None,
     ground: Annotated[
         str | None,
-        typer.Option(help="survey.yaml (surveyed points), square:SIDE (a square reference, side in m), or none."),
+        typer.Option(
+            help="square:SIDE or rectangle:LENGTH,WIDTH (a reference object, m; ,height=H where its top is so high "
+            "above the ground), marker:SIZE[,id=ID] (a printed marker, black square in m), survey.yaml (surveyed "
+            "points), or none."
+        ),
     ] = None,
     reference_box: Annotated[
         str | None, typer.Option(help="Box of the reference in the first frame: left,top,right,bottom px.")
     ] = None,
     camera: Annotated[Path | None, typer.Option(help="Camera file: removes lens distortion.")] = None,
+    telemetry: Annotated[
+        str | None, typer.Option(help="The drone's log (.srt), or none. Default: the log beside the film.")
+    ] = None,
     start: Annotated[float | None, typer.Option(help="Begin here; s.")] = None,
     stop: Annotated[float | None, typer.Option(help="End here; s.")] = None,
     every: Annotated[int | None, typer.Option(help="Read every k-th frame only.")] = None,
     fps: Annotated[float | None, typer.Option(help="Frames a second of a picture folder.")] = None,
     detect_every: Annotated[int | None, typer.Option(help="Detect on every k-th frame; tracks coast between.")] = None,
     outputs: Annotated[
-        str | None, typer.Option(help="What to write, with commas: tracks,proximity,frames,hazards,video,report.")
+        str | None,
+        typer.Option(help="What to write, with commas: tracks,proximity,frames,detections,hazards,video,report."),
     ] = None,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace an earlier run's files in the folder.")
@@ -92,7 +153,7 @@ def run(
     from standoff.monitor import RECORD, ground_warnings, open_run
 
     plain = {
-        "model": model,
+        "telemetry": telemetry,
         "start_s": start,
         "stop_s": stop,
         "every": every,
@@ -101,10 +162,11 @@ def run(
         "outputs": tuple(filter(None, map(str.strip, outputs.split(",")))) if outputs is not None else None,
     }
     overrides: dict[str, Any] = {name: value for name, value in plain.items() if value is not None}
+    overrides |= detector_overrides(model, detections)
     if ground_overrides := _ground_overrides(ground, reference_box, camera):
         overrides["ground"] = ground_overrides
     opened = open_run(source, out, load_settings(config, overrides), overwrite=overwrite)
-    for warning in ground_warnings(opened.pipeline.ground):
+    for warning in (*opened.source.warnings, *ground_warnings(opened.pipeline.ground)):
         typer.echo(f"standoff: warning: {warning}", err=True)
     try:
         watch(opened, quiet=quiet)

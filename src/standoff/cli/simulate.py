@@ -12,6 +12,7 @@ from typer.core import TyperGroup
 from standoff.cli.numbers import two_integers
 from standoff.cli.simulate_composites import composites
 from standoff.simulation import require_packages
+from standoff.simulation.people.anthropometry import MEAN_STATURE_M
 from standoff.simulation.presets import MAX_SEED, PRESETS
 
 
@@ -72,6 +73,17 @@ def _clip_command(name: str) -> Callable[..., None]:
         excavator_mesh: Annotated[
             Path | None, typer.Option(help="Folder of COLLADA or glTF parts in place of the procedural excavator.")
         ] = None,
+        stature: Annotated[float, typer.Option(help="Mean of the workers', barefoot; m.")] = MEAN_STATURE_M,
+        stooping: Annotated[float, typer.Option(help="Share of the workers who work bent over, 0 to 1.")] = 0.0,
+        truth_only: Annotated[
+            bool, typer.Option("--truth-only", help="No pictures: the truth, and detections as noisy as a detector's.")
+        ] = False,
+        cameras: Annotated[
+            int, typer.Option(min=1, max=2, help="Drones over one scene; with 2, a clip of each in its own folder.")
+        ] = 1,
+        devices: Annotated[
+            bool, typer.Option("--devices", help="Positions that wearables report, in devices.parquet as well.")
+        ] = False,
         processes: _Processes = 2,
         overwrite: _Overwrite = False,
         quiet: _Quiet = False,
@@ -80,16 +92,26 @@ def _clip_command(name: str) -> Callable[..., None]:
         from standoff.simulation.presets import plan_clip
 
         require_packages()
-        from standoff.simulation.record import record_clip
+        from standoff.simulation.record import record_cameras, record_clip, record_truth
 
         width_px, height_px = parse_size(size)
         plan = plan_clip(
-            name, seed=seed, masks=masks, variable_rate=variable_rate, excavator_mesh=excavator_mesh, frames=frames,
+            name, seed=seed, masks=masks, variable_rate=variable_rate, excavator_mesh=excavator_mesh,
+            stature_m=stature, stooping=stooping, devices=devices, frames=frames,
             fps=fps, altitude_m=altitude, pitch_deg=pitch, width_px=width_px, height_px=height_px,
         )  # fmt: skip
-        with progress(f"rendering {name}", plan.preset.frames, quiet=quiet) as step:
-            record_clip(plan, out, overwrite=overwrite, processes=processes, on_frame=step)
-        typer.echo(f"{out}/video.mp4 and its truth; measure with: standoff evaluate paper {out}")
+        record, verb = (record_truth, "surveying") if truth_only else (record_clip, "rendering")
+        with progress(f"{verb} {name}", plan.preset.frames * cameras, quiet=quiet) as step:
+            options: dict[str, Any] = {"overwrite": overwrite, "processes": processes, "on_frame": step}
+            if cameras == 1:
+                record(plan, out, **options)
+            else:
+                record_cameras(record, plan, out, cameras=cameras, **options)
+        clip = out if cameras == 1 else out / "camera-1"
+        if truth_only:
+            typer.echo(f"the truth and noisy detections, without pictures, in {clip}")
+        else:
+            typer.echo(f"{clip}/video.mp4 and its truth; measure with: standoff evaluate paper {clip}")
 
     render.__doc__ = PRESETS[name].summary
     return render

@@ -4,8 +4,16 @@ Every stage's own settings are a plain dataclass beside the stage; this package 
 which checks their bounds.
 """
 
-from standoff.config.build import build_ground, build_pipeline, build_replacement, build_stage, import_factory
+from standoff.config.build import (
+    build_ground,
+    build_marker_observer,
+    build_pipeline,
+    build_replacement,
+    build_stage,
+    import_factory,
+)
 from standoff.config.load import load_settings, read_settings_file, resolved
+from standoff.config.markers import MarkerSettings
 from standoff.config.params import read_params
 from standoff.config.settings import (
     OUTPUT_NAMES,
@@ -20,10 +28,12 @@ __all__ = [
     "OUTPUT_NAMES",
     "STAGE_NAMES",
     "GroundSettings",
+    "MarkerSettings",
     "ReferenceSettings",
     "Replacement",
     "Settings",
     "build_ground",
+    "build_marker_observer",
     "build_pipeline",
     "build_replacement",
     "build_stage",

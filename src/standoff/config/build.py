@@ -7,15 +7,24 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from standoff.config.settings import Replacement, Settings, StageName
-from standoff.core.camera import Camera
+from standoff.core.camera import Camera, CameraPrior
 from standoff.core.errors import ConfigError
-from standoff.core.protocols import Detector, Ground
+from standoff.core.protocols import CameraMotionEstimator, Detector, Ground
 from standoff.core.types import Frame
 from standoff.pipeline import Pipeline
-from standoff.stages.detect import OnnxDetector, find_model
-from standoff.stages.ground import ReferenceGround, Unmapped, load_camera, load_survey
+from standoff.stages.detect import OnnxDetector, RecordedDetector, find_model
+from standoff.stages.ground import (
+    FusedGround,
+    GivenPlace,
+    MarkerObserver,
+    ReferenceGround,
+    Unmapped,
+    load_camera,
+    load_survey,
+)
 from standoff.stages.hazard import HazardMonitor
 from standoff.stages.locate import Locator
+from standoff.stages.motion import MotionEstimator
 from standoff.stages.proximity import ProximityMeter, side_classes
 from standoff.stages.track import Tracker
 
@@ -56,39 +65,81 @@ def build_replacement(name: str, replacement: Replacement) -> Any:  # noqa: ANN4
 
 
 def build_detector(settings: Settings) -> Detector:
-    """Load the configured model.
+    """Load the configured model, or the detections of an earlier run.
 
     Raises:
-        ModelError: It cannot be used.
+        ModelError: The model cannot be used.
+        DataError: The detections cannot.
     """
+    if settings.detections is not None:
+        return RecordedDetector(settings.detections)
     return OnnxDetector(find_model(settings.model), settings.detect)
 
 
-def build_ground(settings: Settings) -> Ground:
+def _configured_camera(settings: Settings) -> Camera | None:
+    return load_camera(settings.ground.camera) if settings.ground.camera else None
+
+
+def build_motion(settings: Settings) -> CameraMotionEstimator:
+    """Make what follows the picture, without the lens distortion where a camera file is given.
+
+    Raises:
+        GroundError: The camera file cannot be used.
+    """
+    return MotionEstimator(settings.motion, _configured_camera(settings))
+
+
+def build_marker_observer(settings: Settings) -> MarkerObserver | None:
+    """Make what watches for the configured markers; None where there are none.
+
+    Raises:
+        GroundError: An id that the family does not have.
+    """
+    if not settings.ground.markers:
+        return None
+    return MarkerObserver([marker.place() for marker in settings.ground.markers], settings.ground.marker_family)
+
+
+def build_ground(settings: Settings, known: CameraPrior | None = None) -> Ground:
     """Make the configured ground stage.
+
+    Args:
+        settings: Of everything.
+        known: What the source knows of its camera; a camera file knows better.
 
     Raises:
         GroundError: Its points, shape or camera file cannot be used.
     """
-    camera: Camera | None = load_camera(settings.ground.camera) if settings.ground.camera else None
+    camera = _configured_camera(settings)
+    if settings.ground.markers:
+        # Silence about a marker that nobody reads would pass for a site without one.
+        raise ConfigError(
+            expected="a ground stage of your own that reads markers (replace.ground)",
+            found="ground.markers with standoff's own, which does not read them yet",
+            fix="take the markers out, or describe a reference object or a survey",
+        )
     if settings.ground.survey is not None:
         return load_survey(settings.ground.survey, camera=camera)
     reference = settings.ground.reference
     if reference is None:
         return Unmapped()
-    return ReferenceGround(
+    place = GivenPlace(reference.box_px, reference.box_time_s, reference.first_corner_px)
+    method = reference.params.method
+    if method not in ("fused", "refined"):
+        return ReferenceGround(reference.shape(), reference.params, place=place, camera=camera)
+    return FusedGround(
         reference.shape(),
         reference.params,
-        box_xyxy_px=reference.box_px,
-        box_time_s=reference.box_time_s,
-        first_corner_px=reference.first_corner_px,
-        camera=camera,
+        height_m=reference.height_m,
+        place=place,
+        camera=known if camera is None else CameraPrior.calibrated(camera),
+        remember=method == "fused",
     )
 
 
 _MAKERS: Mapping[StageName, Callable[[Settings], Any]] = {
     "detect": build_detector,
-    "ground": build_ground,
+    "motion": build_motion,
     "track": lambda settings: Tracker(settings.track),
     "locate": lambda settings: Locator(settings.locate),
     "proximity": lambda settings: ProximityMeter(settings.proximity),
@@ -96,14 +147,22 @@ _MAKERS: Mapping[StageName, Callable[[Settings], Any]] = {
 }
 
 
-def build_stage(name: StageName, settings: Settings) -> Any:  # noqa: ANN401
+def build_stage(name: StageName, settings: Settings, camera: CameraPrior | None = None) -> Any:  # noqa: ANN401
     """Make one stage, standoff's own or the configured replacement.
+
+    Args:
+        name: Of the stage.
+        settings: Of everything.
+        camera: What the source knows of its camera.
 
     Raises:
         StandoffError: Something that the settings name cannot be used.
     """
-    if name in settings.replace:
+    is_replayed = name == "detect" and settings.detections is not None
+    if name in settings.replace and not is_replayed:
         return build_replacement(name, settings.replace[name])
+    if name == "ground":
+        return build_ground(settings, camera)
     return _MAKERS[name](settings)
 
 
@@ -130,12 +189,13 @@ def _check_visible(settings: Settings, detector: Detector) -> None:
         )
 
 
-def build_pipeline(settings: Settings, frames: Iterable[Frame]) -> Pipeline:
+def build_pipeline(settings: Settings, frames: Iterable[Frame], camera: CameraPrior | None = None) -> Pipeline:
     """Make one stream's pipeline, without sinks; all state belongs to the objects made here.
 
     Args:
         settings: What to build.
         frames: The source.
+        camera: What the source knows of its camera.
 
     Raises:
         StandoffError: A model, survey, camera or replacement that cannot be used.
@@ -145,7 +205,8 @@ def build_pipeline(settings: Settings, frames: Iterable[Frame]) -> Pipeline:
     return Pipeline(
         frames=frames,
         detector=detector,
-        ground=build_stage("ground", settings),
+        motion=build_stage("motion", settings),
+        ground=build_stage("ground", settings, camera),
         tracker=build_stage("track", settings),
         locator=build_stage("locate", settings),
         proximity=build_stage("proximity", settings),

@@ -65,8 +65,15 @@ def read_settings_file(path: Path) -> dict[str, Any]:
 def _anchor_paths(settings: dict[str, Any], folder: Path) -> None:
     """Make paths absolute: those of a file are relative to it, not to wherever the program was started."""
     ground = settings.get("ground")
-    for section, name in ((settings, "model"), (ground, "survey"), (ground, "camera")):
-        named = name == "model" and settings.get(name) in SHIPPED_MODELS
+    places = (
+        (settings, "model"),
+        (settings, "detections"),
+        (settings, "telemetry"),
+        (ground, "survey"),
+        (ground, "camera"),
+    )
+    for section, name in places:
+        named = section is settings and settings.get(name) in (*SHIPPED_MODELS, "none")
         if isinstance(section, dict) and isinstance(section.get(name), str) and not named:
             section[name] = str((folder / section[name]).resolve())
 

@@ -11,19 +11,21 @@ from typing import Annotated, Any, Literal, get_type_hints
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
+from standoff.config.markers import MarkerSettings, check_markers
 from standoff.stages.detect import DetectParams, ShippedModel
-from standoff.stages.ground import ReferenceParams, ReferenceShape
+from standoff.stages.ground import MarkerFamily, ReferenceParams, ReferenceShape
 from standoff.stages.hazard import HazardParams
 from standoff.stages.locate import LocateParams
+from standoff.stages.motion import MotionParams
 from standoff.stages.proximity import ProximityParams
 from standoff.stages.sinks import ReportParams, TableParams, VideoParams
 from standoff.stages.track import TrackParams
 
 Point = tuple[float, float]
-StageName = Literal["detect", "ground", "track", "locate", "proximity", "hazard"]
-STAGE_NAMES: tuple[StageName, ...] = ("detect", "ground", "track", "locate", "proximity", "hazard")
-OutputName = Literal["tracks", "proximity", "frames", "hazards", "video", "report"]
-OUTPUT_NAMES: tuple[OutputName, ...] = ("tracks", "proximity", "frames", "hazards", "video", "report")
+OutputName = Literal["tracks", "proximity", "frames", "detections", "hazards", "video", "report"]
+OUTPUT_NAMES: tuple[OutputName, ...] = ("tracks", "proximity", "frames", "detections", "hazards", "video", "report")
+StageName = Literal["detect", "motion", "ground", "track", "locate", "proximity", "hazard"]
+STAGE_NAMES: tuple[StageName, ...] = ("detect", "motion", "ground", "track", "locate", "proximity", "hazard")
 
 
 class _Section(BaseModel):
@@ -45,6 +47,10 @@ class ReferenceSettings(_Section):
     corners_m: Annotated[
         tuple[Point, Point, Point, Point] | None,
         Field(description="Four corners, counter-clockwise seen from above, in the site frame; m."),
+    ] = None
+    height_m: Annotated[
+        float | None,
+        Field(ge=0, description="Height of its top above the ground; m. 0: flat. Absent: unknown and estimated."),
     ] = None
     box_px: Annotated[
         tuple[float, float, float, float] | None,
@@ -96,12 +102,20 @@ class GroundSettings(_Section):
             "where it is (box_px, box_time_s, first_corner_px), and params (method, thresholds)."
         ),
     ] = None
+    markers: Annotated[
+        tuple[MarkerSettings, ...],
+        Field(
+            description="Printed markers (see `standoff marker`): id, size_m, and a place unless it is the only one."
+        ),
+    ] = ()
+    marker_family: Annotated[MarkerFamily, Field(description="Of all printed markers.")] = "apriltag36h11"
     camera: Annotated[Path | None, Field(description="Camera file whose lens distortion is removed first.")] = None
 
     @model_validator(mode="after")
     def _one_source(self) -> GroundSettings:
         if self.survey is not None and self.reference is not None:
             raise ValueError("give either survey or reference, not both")
+        check_markers(self.markers, "survey" if self.survey else "reference" if self.reference else None)
         return self
 
 
@@ -127,12 +141,26 @@ class Settings(BaseSettings):
         ShippedModel | Path,
         Field(description="The detector: site or site-int8 (ours), or an ONNX file (see `standoff export`)."),
     ] = "site"
+    detections: Annotated[
+        Path | None,
+        Field(
+            description="An earlier run of the same source (its folder, or its detections.parquet) whose detections "
+            "are replayed; model, detect and a detect stage of your own then have no effect."
+        ),
+    ] = None
     start_s: Annotated[float, Field(ge=0, description="Begin here; s.")] = 0.0
     stop_s: Annotated[float | None, Field(gt=0, description="End here; s. Absent: the source's end.")] = None
     every: Annotated[int, Field(ge=1, description="Read every k-th frame only.")] = 1
     fps: Annotated[float | None, Field(gt=0, description="Frames a second of an image folder.")] = None
+    telemetry: Annotated[
+        Literal["none"] | Path | None,
+        Field(
+            description="The drone's log (.srt), or none. Absent: the log beside the film, or the pictures' EXIF data."
+        ),
+    ] = None
     detect_every: Annotated[int, Field(ge=1, description="Detect on every k-th frame read; tracks coast between.")] = 1
     detect: Annotated[DetectParams, Field(description="The detector.")] = DetectParams()
+    motion: Annotated[MotionParams, Field(description="How the picture is followed.")] = MotionParams()
     ground: Annotated[GroundSettings, Field(description="The ground map.")] = GroundSettings()
     track: Annotated[TrackParams, Field(description="The tracker.")] = TrackParams()
     locate: Annotated[LocateParams, Field(description="From boxes to places on the ground.")] = LocateParams()

@@ -78,8 +78,15 @@ class Camera:
         points_px: FloatArray = normalised * np.array([self.matrix[0, 0], self.matrix[1, 1]]) + self.matrix[:2, 2]
         return points_px
 
-    def _distorted(self, normalised: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return distorted normalised points (N, 2) and their Jacobian (N, 2, 2)."""
+    def distorted_with_jacobian(self, normalised: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Bend directions as the lens does.
+
+        Args:
+            normalised: (N, 2) x / z and y / z in the camera frame.
+
+        Returns:
+            (N, 2) the same, distorted, and (N, 2, 2) their derivative.
+        """
         k1, k2, p1, p2, k3 = self.distortion
         x, y = normalised.T
         r2 = x * x + y * y
@@ -106,7 +113,7 @@ class Camera:
         slope_roots = np.roots([7.0 * k3, 5.0 * k2, 3.0 * k1, 1.0])
         folds_r2 = slope_roots.real[(slope_roots.real > 0) & (np.abs(slope_roots.imag) < 1e-12)]
         with np.errstate(invalid="ignore", over="ignore"):
-            _, jacobian = self._distorted(normalised)
+            _, jacobian = self.distorted_with_jacobian(normalised)
             determinant = jacobian[:, 0, 0] * jacobian[:, 1, 1] - jacobian[:, 0, 1] * jacobian[:, 1, 0]
             grows = (determinant > 0) & (jacobian[:, 0, 0] + jacobian[:, 1, 1] > 0)
             unfolded: BoolArray = grows & ((normalised**2).sum(axis=1) < folds_r2.min(initial=np.inf))
@@ -123,7 +130,7 @@ class Camera:
         """
         normalised = self._to_normalised(points_px)
         with np.errstate(invalid="ignore", over="ignore"):
-            distorted, _ = self._distorted(normalised)
+            distorted, _ = self.distorted_with_jacobian(normalised)
         distorted[~self._unfolded(normalised)] = np.nan
         return self._to_pixels(distorted)
 
@@ -141,7 +148,7 @@ class Camera:
         estimate = wanted.copy()
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             for _ in range(_UNDISTORT_ITERATIONS):
-                distorted, jacobian = self._distorted(estimate)
+                distorted, jacobian = self.distorted_with_jacobian(estimate)
                 error = distorted - wanted
                 if not np.isfinite(error).any() or np.nanmax(np.abs(error)) < _UNDISTORT_TOLERANCE:
                     break
@@ -152,7 +159,7 @@ class Camera:
                         (jacobian[:, 0, 0] * error[:, 1] - jacobian[:, 1, 0] * error[:, 0]) / determinant,
                     ]
                 )
-            distorted, _ = self._distorted(estimate)
+            distorted, _ = self.distorted_with_jacobian(estimate)
             found = self._unfolded(estimate) & (np.abs(distorted - wanted).max(axis=1, initial=0.0) < 1e-9)
         estimate[~found] = np.nan
         return self._to_pixels(estimate)

@@ -2,6 +2,10 @@
 
 Site frame: x east, y north, z up, metres. Camera frame: x to the right of the picture, y down, z forward.
 Pixels follow the half-pixel convention of `standoff.core.camera`.
+
+A *change* of a view has eight parameters, `CHANGES`: a small turn about the camera's own axes (rad), a shift of its
+position in the site frame (m), the logarithm of a factor of the focal length, and an addition to the lens's k1.
+Covariances of views are of these.
 """
 
 from __future__ import annotations
@@ -12,7 +16,14 @@ from typing import Self
 import numpy as np
 
 from standoff.core.camera import Camera
+from standoff.core.errors import GroundError
 from standoff.core.homography import FloatArray
+
+CHANGES = 8
+"""Parameters of a change: turn (3), shift (3), log focal length, k1."""
+
+TURN, SHIFT, POSE, LENS = slice(0, 3), slice(3, 6), slice(0, 6), slice(6, 8)
+"""Their places in a change."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -113,3 +124,153 @@ class View:
         )
         homography: FloatArray = self.camera.matrix @ camera_from_plane
         return homography
+
+    def changed(self, change: FloatArray) -> View:
+        """Return the view after a change of eight parameters (see the module's head)."""
+        change = np.asarray(change, dtype=np.float64)
+        camera = self.camera
+        if change[LENS].any():
+            camera = camera.refocused(float(np.exp(change[6])), float(camera.distortion[0] + change[7]))
+        turned = rotation_from_vector(change[TURN]) @ self.site_to_camera
+        # Many small turns in a row must remain a rotation.
+        left, _, right = np.linalg.svd(turned)
+        return View(camera, self.position_m + change[SHIFT], left @ right)
+
+    def change_from(self, other: View) -> FloatArray:
+        """Return the change (8,) that leads from another view to this one."""
+        return np.concatenate(
+            [
+                vector_from_rotation(self.site_to_camera @ other.site_to_camera.T),
+                self.position_m - other.position_m,
+                [
+                    np.log(self.camera.matrix[0, 0] / other.camera.matrix[0, 0]),
+                    self.camera.distortion[0] - other.camera.distortion[0],
+                ],
+            ]
+        )
+
+    def project_with_jacobians(self, points_m: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Project points, and say how their pictures move with the view and with the points.
+
+        Args:
+            points_m: (N, 3), site frame.
+
+        Returns:
+            (N, 2) pixels as seen in the picture; (N, 2, 8) their derivative by a change of the view; (N, 2, 3) by the
+            points; NaN behind the camera.
+        """
+        points_m = np.asarray(points_m, dtype=np.float64).reshape(-1, 3)
+        in_camera = (points_m - self.position_m) @ self.site_to_camera.T
+        depth = np.where(in_camera[:, 2] > 0, in_camera[:, 2], np.nan)
+        normalised = in_camera[:, :2] / depth[:, None]
+        distorted, by_normalised = self.camera.distorted_with_jacobian(normalised)
+        focal = np.array([self.camera.matrix[0, 0], self.camera.matrix[1, 1]])
+        points_px = distorted * focal + self.camera.matrix[:2, 2]
+
+        by_camera_point = np.zeros((len(points_m), 2, 3))
+        by_camera_point[:, 0, 0] = by_camera_point[:, 1, 1] = 1.0 / depth
+        by_camera_point[:, :, 2] = -normalised / depth[:, None]
+        by_camera_point = focal[:, None] * (by_normalised @ by_camera_point)
+        by_point = by_camera_point @ self.site_to_camera
+        by_view = np.empty((len(points_m), 2, CHANGES))
+        # A turn w moves a point p of the camera frame by w x p.
+        x, y, z = in_camera.T
+        zero = np.zeros_like(x)
+        cross = np.stack([np.stack([zero, z, -y], -1), np.stack([-z, zero, x], -1), np.stack([y, -x, zero], -1)], 1)
+        by_view[:, :, TURN] = by_camera_point @ cross
+        by_view[:, :, SHIFT] = -by_point
+        by_view[:, :, 6] = distorted * focal
+        by_view[:, :, 7] = normalised * (normalised**2).sum(axis=1, keepdims=True) * focal
+        return points_px, by_view, by_point
+
+
+def rotation_from_vector(vector: FloatArray) -> FloatArray:
+    """Return the (3, 3) rotation by |vector| radians about a vector (Rodrigues).
+
+    >>> np.round(rotation_from_vector(np.array([0.0, 0.0, np.pi / 2])) @ [1.0, 0.0, 0.0], 9) + 0.0
+    array([0., 1., 0.])
+    """
+    angle = float(np.linalg.norm(vector))
+    x, y, z = vector
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    if angle < 1e-8:
+        return np.eye(3) + cross
+    rotation: FloatArray = (
+        np.eye(3) + np.sin(angle) / angle * cross + (1.0 - np.cos(angle)) / angle**2 * (cross @ cross)
+    )
+    return rotation
+
+
+def vector_from_rotation(rotation: FloatArray) -> FloatArray:
+    """Return the vector (3,) of `rotation_from_vector`, for turns of less than half a circle.
+
+    >>> np.round(vector_from_rotation(rotation_from_vector(np.array([0.1, -0.2, 0.3]))), 9)
+    array([ 0.1, -0.2,  0.3])
+    """
+    axis = np.array([rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1]])
+    sine, cosine = float(np.linalg.norm(axis)) / 2.0, (float(np.trace(rotation)) - 1.0) / 2.0
+    if sine < 1e-9:
+        return axis / 2.0
+    vector: FloatArray = axis / (2.0 * sine) * np.arctan2(sine, cosine)
+    return vector
+
+
+def poses_of_plane(plane_to_camera: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the poses whose view of the ground z = 0 is nearest to given homographies.
+
+    The first two columns of such a homography are the first two of the rotation, times a scale that both share.
+    Where they are not quite at right angles and equally long, the nearest two that are take their place.
+
+    Args:
+        plane_to_camera: (..., 3, 3) signed, from metres to normalised pinhole coordinates (x / z, y / z).
+
+    Returns:
+        (..., 3, 3) rotations site_to_camera and (..., 3) positions in the site frame; below the ground where the
+        homography is a mirror's.
+    """
+    columns = plane_to_camera[..., :2]
+    gram = np.swapaxes(columns, -1, -2) @ columns
+    product = np.sqrt(np.linalg.det(gram))[..., None, None]
+    both = np.sqrt(np.trace(gram, axis1=-2, axis2=-1)[..., None, None] + 2.0 * product)
+    # Of the 2 x 2 matrix G, (G + sqrt(det G) I) / sqrt(trace G + 2 sqrt(det G)) is the square root.
+    root = (gram + product * np.eye(2)) / both
+    axes = columns @ np.linalg.inv(root)
+    rotation = np.concatenate([axes, np.cross(axes[..., 0], axes[..., 1])[..., None]], axis=-1)
+    shift_m = plane_to_camera[..., 2] / (both[..., 0] / 2.0)
+    position_m: FloatArray = -np.einsum("...ji,...j->...i", rotation, shift_m)
+    return rotation, position_m
+
+
+def view_from_homography(image_to_ground: FloatArray, camera: Camera) -> View:
+    """Return where a known camera is, from its map of the ground.
+
+    Args:
+        image_to_ground: (3, 3) signed homography from undistorted pixels to metres, x east, y north seen from above.
+        camera: Lens; a homography that no pose of this camera explains exactly gives the nearest one.
+
+    Raises:
+        GroundError: No camera above the ground sees it so: the ground's axes are left-handed, or it is seen edge on.
+
+    >>> camera = Camera(200, 100, np.array([[90.0, 0.0, 100.0], [0.0, 90.0, 50.0], [0.0, 0.0, 1.0]]), np.zeros(5))
+    >>> view = View.aimed(camera, np.array([1.0, 2.0, 30.0]), heading_deg=10.0, pitch_deg=50.0)
+    >>> view_from_homography(np.linalg.inv(view.plane_to_pinhole()), camera).position_m.round(9).tolist()
+    [1.0, 2.0, 30.0]
+    """
+    try:
+        plane_to_camera = np.linalg.inv(camera.matrix) @ np.linalg.inv(image_to_ground)
+        rotation, position_m = poses_of_plane(plane_to_camera)
+    except np.linalg.LinAlgError as error:
+        raise _no_view("a matrix that has no inverse") from error
+    if not np.isfinite(rotation).all() or not np.isfinite(position_m).all():
+        raise _no_view("a plane seen edge on")
+    if position_m[2] <= 0:
+        raise _no_view("the ground seen from below, as in a mirror")
+    return View(camera, position_m, rotation)
+
+
+def _no_view(found: str) -> GroundError:
+    return GroundError(
+        expected="a map of ground that a camera above it sees",
+        found=found,
+        fix="give x and y of the ground so that y is to the left of x, seen from above",
+    )

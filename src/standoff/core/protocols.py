@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from standoff.core.types import (
+    CameraMotion,
     Detections,
     Frame,
     GroundMap,
     GroundPositions,
     Hazard,
+    NoCameraMotion,
     NoGroundMap,
     Proximities,
     Tracks,
 )
 
 AnyGround = GroundMap | NoGroundMap
+AnyMotion = CameraMotion | NoCameraMotion
 
 
 class Detector(Protocol):
@@ -26,10 +29,30 @@ class Detector(Protocol):
         ...
 
 
+@runtime_checkable
+class RestingDetector(Detector, Protocol):
+    """A detector that has nothing to say of some frames, which is not the same as seeing nothing there."""
+
+    def rests(self, frame: Frame) -> bool:
+        """Tell whether tracks must coast at this frame, whatever `detect_every` is."""
+        ...
+
+
+class CameraMotionEstimator(Protocol):
+    """Find out how the picture of the ground moved."""
+
+    def update(self, frame: Frame, detections: Detections) -> AnyMotion:
+        """Return the motion since a keyframe, or the reason why there is none.
+
+        `detections` are of this frame, so that what moves by itself can be left out; empty where the detector rested.
+        """
+        ...
+
+
 class Ground(Protocol):
     """Find out where a pixel stands on the ground."""
 
-    def update(self, frame: Frame, detections: Detections) -> AnyGround:
+    def update(self, frame: Frame, detections: Detections, motion: AnyMotion) -> AnyGround:
         """Return the frame's map, or the reason why there is none."""
         ...
 
@@ -37,11 +60,11 @@ class Ground(Protocol):
 class Tracker(Protocol):
     """Follow entities over time."""
 
-    def update(self, time_s: float, detections: Detections) -> Tracks:
+    def update(self, time_s: float, detections: Detections, motion: AnyMotion) -> Tracks:
         """Return the live tracks after a frame on which the detector ran."""
         ...
 
-    def coast(self, time_s: float) -> Tracks:
+    def coast(self, time_s: float, motion: AnyMotion) -> Tracks:
         """Return the live tracks, all predicted, at a frame on which the detector rested."""
         ...
 

@@ -18,6 +18,7 @@ from standoff.core import homography
 from standoff.core.camera import Camera
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.rows import Columns, Rows
+from standoff.core.telemetry import Telemetry
 
 IntArray = npt.NDArray[np.int64]
 ImageArray = npt.NDArray[np.uint8]
@@ -60,6 +61,7 @@ class Frame:
         time_s: Presentation timestamp, seconds from the start of the source.
         captured_at: Aware UTC time of capture, or None when the source does not tell.
         picture: The pixels.
+        telemetry: What the drone said of itself at that moment; None: nothing.
     """
 
     stream_id: str
@@ -67,6 +69,7 @@ class Frame:
     time_s: float
     picture: Picture
     captured_at: datetime | None = None
+    telemetry: Telemetry | None = None
 
     @property
     def image(self) -> ImageArray:
@@ -179,7 +182,8 @@ class GroundMap:
         image_to_ground: (3, 3) signed homography from *undistorted* pixels to metres in the site frame
             (x east, y north; or x along the reference's first edge, y to its left seen from above);
             its denominator is positive in front of the camera.
-        covariance: (9, 9) of its entries, row by row, for the matrix as scaled here.
+        covariance: (10, 10) of its entries, row by row, for the matrix as scaled here, and of the lens's k1; (9, 9) of
+            the entries alone where the lens is taken as it is.
         image_size_px: (width, height) of the pictures that it is for.
         valid_px: (V, 2) polygon in undistorted pixels outside which it is not trusted; V = 0: no limit
             but the horizon.
@@ -201,7 +205,11 @@ class GroundMap:
     age_s: float = 0.0
 
     def __post_init__(self) -> None:
-        shapes = {"image_to_ground": (3, 3), "covariance": (9, 9), "valid_px": (-1, 2), "anchors_px": (-1, 2)}
+        covariance = np.zeros((10, 10))
+        given = np.asarray(self.covariance, dtype=np.float64)
+        covariance[: len(given), : len(given)] = given
+        object.__setattr__(self, "covariance", covariance)
+        shapes = {"image_to_ground": (3, 3), "covariance": (10, 10), "valid_px": (-1, 2), "anchors_px": (-1, 2)}
         for name, shape in shapes.items():
             array = np.array(getattr(self, name), dtype=np.float64).reshape(shape)
             if not np.isfinite(array).all():
@@ -269,7 +277,7 @@ class GroundPositions(Rows):
         xy_m: (M, 2) site frame; NaN where invalid.
         velocity_mps: (M, 2) site frame; NaN while unknown.
         covariance_m2: (M, 2, 2) of xy_m, the map's share included; NaN where invalid.
-        map_factor_m: (M, 2, 9) the map's share F: covariance F_i F_i^T, and F_i F_j^T between two entities,
+        map_factor_m: (M, 2, 10) the map's share F: covariance F_i F_i^T, and F_i F_j^T between two entities,
             because all of a frame's positions lean on the same map; NaN where invalid.
         radius_m: (M,) action radius.
         valid: (M,).
@@ -292,7 +300,7 @@ class GroundPositions(Rows):
         "xy_m": (np.float64, (2,)),
         "velocity_mps": (np.float64, (2,)),
         "covariance_m2": (np.float64, (2, 2)),
-        "map_factor_m": (np.float64, (2, 9)),
+        "map_factor_m": (np.float64, (2, 10)),
         "radius_m": (np.float64, ()),
         "valid": (np.bool_, ()),
         "reason": (np.object_, ()),
@@ -387,6 +395,7 @@ class FrameResult:
         frame: The frame.
         detections: Empty on frames where the detector rested.
         detected: False on frames where the detector rested (`detect_every`).
+        motion: How the picture of the ground moved, or why that is not known.
         ground: The map, or why there is none.
         tracks: Live tracks.
         positions: Row i belongs to track i.
@@ -398,6 +407,7 @@ class FrameResult:
     frame: Frame
     detections: Detections
     detected: bool
+    motion: CameraMotion | NoCameraMotion
     ground: GroundMap | NoGroundMap
     tracks: Tracks
     positions: GroundPositions

@@ -27,6 +27,7 @@ from standoff.stages.frames import AvPicture, Scaler
 from standoff.stages.ground import ReferenceGround, ReferenceShape, SurveyedGround
 from standoff.stages.hazard import HazardMonitor
 from standoff.stages.locate import Locator
+from standoff.stages.motion import MotionEstimator
 from standoff.stages.proximity import ProximityMeter
 from standoff.stages.sinks import (
     FRAMES,
@@ -186,6 +187,7 @@ def monitor_workload(
         pipeline = Pipeline(
             frames=site.frames(frames),
             detector=ScriptedDetector(site),
+            motion=MotionEstimator(),
             ground=site.ground(ground),
             tracker=Tracker(),
             locator=Locator(),

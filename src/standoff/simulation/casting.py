@@ -7,7 +7,7 @@ the middle of the picture; turns in degrees, counter-clockwise from x.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
@@ -25,6 +25,7 @@ from standoff.simulation.machines.roller import make_roller
 from standoff.simulation.machines.vehicle import make_vehicle
 from standoff.simulation.machines.wheel_loader import make_wheel_loader
 from standoff.simulation.motion import Place, sample
+from standoff.simulation.people.anthropometry import MEAN_STATURE_M
 from standoff.simulation.people.worker import make_worker
 from standoff.simulation.scene import Actor, Model, Motion
 
@@ -47,6 +48,7 @@ class Stage:
         duration_s: Of all motions.
         excavator_mesh: Folder of parts in place of the procedural excavators, or None.
         reference_m: (2,) where the reference object's middle is, in the stage's directions; None without one.
+        mean_stature_m: Of the workers, barefoot.
     """
 
     heading_deg: float
@@ -54,6 +56,7 @@ class Stage:
     duration_s: float
     excavator_mesh: Path | None
     reference_m: tuple[float, float] | None
+    mean_stature_m: float = MEAN_STATURE_M
 
     def place(self, x_m: float, y_m: float, turn_deg: float = 0.0) -> Place:
         """Return a place on the stage in site coordinates."""
@@ -63,6 +66,10 @@ class Stage:
     def excavator(self, rng: np.random.Generator) -> Model:
         """Draw an excavator, from the mesh folder if there is one."""
         return make_excavator(rng) if self.excavator_mesh is None else load_excavator(self.excavator_mesh, rng)
+
+    def worker(self, rng: np.random.Generator) -> Model:
+        """Draw a worker of this site's stature."""
+        return make_worker(rng, mean_stature_m=self.mean_stature_m)
 
 
 @dataclass(slots=True)
@@ -126,10 +133,18 @@ def swept(model: Model, motion: Motion) -> shapely.Geometry:
     return shapely.union_all(shapes).buffer(0.1).simplify(0.05)
 
 
+def bend_over(rng: np.random.Generator, cast: Cast, share: float) -> None:
+    """Let a share of the workers, whoever they are, do what they do stooping; ways and times stay as they are."""
+    people = [k for k, actor in enumerate(cast.actors) if is_person(actor.model)]
+    for k in rng.permutation(people)[: round(share * len(people))].tolist():
+        actor = cast.actors[k]
+        cast.actors[k] = replace(actor, motion=behaviour.stooping(rng, actor.motion))
+
+
 def _mobile(rng: np.random.Generator, stage: Stage) -> Cast:
     """The paper's mobile test: one worker, one wheel loader, one excavator."""
     cast = Cast()
-    excavator, loader, worker = stage.excavator(rng), make_wheel_loader(rng), make_worker(rng)
+    excavator, loader, worker = stage.excavator(rng), make_wheel_loader(rng), stage.worker(rng)
     digs = behaviour.digging(rng, excavator, stage.place(9.0, 6.5, float(rng.uniform(200.0, 240.0))), stage.duration_s)
     cast.add([excavator], [digs], force=True)
     spreads = behaviour.spreading(rng, loader, stage.place(-14.0, 8.0, -4.0), 15.0, stage.duration_s)
@@ -147,7 +162,7 @@ def _demo(rng: np.random.Generator, stage: Stage) -> Cast:
     """
     cast = Cast()
     excavator, loader = stage.excavator(rng), make_wheel_loader(rng)
-    beside, behind, apart = make_worker(rng), make_worker(rng), make_worker(rng)
+    beside, behind, apart = stage.worker(rng), stage.worker(rng), stage.worker(rng)
     digs = behaviour.digging(rng, excavator, stage.place(13.0, 8.0, 70.0), stage.duration_s)
     cast.add([excavator], [digs], force=True)
     start = stage.place(-10.0, 14.0, 97.0)
@@ -165,7 +180,7 @@ def _demo(rng: np.random.Generator, stage: Stage) -> Cast:
 def _stationary(rng: np.random.Generator, stage: Stage, *, distance_m: float) -> Cast:
     """The paper's stationary test: worker and excavator at exactly a distance."""
     cast = Cast()
-    models = (stage.excavator(rng), make_worker(rng))
+    models = (stage.excavator(rng), stage.worker(rng))
     tilt_deg = float(rng.uniform(-8.0, 8.0))
     place = stage.place(distance_m / 2, 2.5, tilt_deg + float(rng.uniform(-60.0, 60.0)))
     bearing_rad = float(np.deg2rad(180.0 + tilt_deg - stage.heading_deg))
@@ -246,7 +261,7 @@ def _machine_activity(rng: np.random.Generator, stage: Stage, left: int, workers
         beside = place.moved(-9.0, float(rng.choice([-1, 1]) * 8.0), float(rng.normal(0.0, 0.3)))
         return pair, behaviour.loader_loading(rng, *pair, place, beside, lasting_s)
     if kind in ("behind", "miss"):
-        machine, worker = _driving_machine(rng), make_worker(rng)
+        machine, worker = _driving_machine(rng), stage.worker(rng)
         if kind == "behind":
             return (machine, worker), behaviour.crossing_behind(rng, machine, worker, place, lasting_s)
         return (machine, worker), behaviour.near_miss(rng, machine, worker, place, lasting_s)
@@ -292,9 +307,9 @@ def _people_activity(rng: np.random.Generator, stage: Stage, left: int, cast: Ca
     place, lasting_s = _near_somebody(rng, stage, cast), stage.duration_s
     kind = str(rng.choice(["work", "carry", "walk"] + ["talk"] * (left > 1)))
     if kind == "talk":
-        pair = make_worker(rng), make_worker(rng)
+        pair = stage.worker(rng), stage.worker(rng)
         return pair, behaviour.pair_talking(rng, pair, place, lasting_s)
-    worker = make_worker(rng)
+    worker = stage.worker(rng)
     if kind == "work":
         return [worker], [behaviour.standing_working(rng, worker, place, lasting_s)]
     reach_m = float(rng.uniform(5.0, 12.0))

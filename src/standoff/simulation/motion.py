@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from standoff.core.homography import FloatArray
-from standoff.simulation.mesh import rotated_xy, rotation
+from standoff.simulation.mesh import crossed, rotated_xy, rotation
 from standoff.simulation.scene import Ground, Model, Motion
 
 STEP_S = 0.02
@@ -138,7 +138,7 @@ def place_on_ground(placement: Placement, footprint_m: FloatArray, ground: Groun
     forward = np.array([1.0, 0.0, ahead]) / np.hypot(1.0, ahead)
     normal = np.array([-ahead, -left, 1.0])
     normal /= np.linalg.norm(normal)
-    pose[:3, :3] = yaw @ np.column_stack([forward, np.cross(normal, forward), normal])
+    pose[:3, :3] = yaw @ np.column_stack([forward, crossed(normal, forward), normal])
     return pose
 
 

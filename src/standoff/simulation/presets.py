@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import Literal
 
 from standoff.core.errors import ConfigError
+from standoff.simulation.people.anthropometry import MEAN_STATURE_M
 
 Condition = Literal["noon", "afternoon", "low_sun", "hazy", "overcast", "dusk"]
 """Weather and hour."""
@@ -151,6 +152,10 @@ class Plan:
         masks: Whether masks go into the annotations.
         variable_rate: Whether the time between frames varies.
         excavator_mesh: Folder of parts in place of the procedural excavators, or None.
+        stature_m: Mean of the workers', barefoot.
+        stooping: Share of the workers who work bent over for much of the time.
+        devices: Whether wearables report positions, in `devices.parquet`.
+        camera: Which drone films, from 1; all film the same scene, from different sides.
     """
 
     name: str
@@ -159,6 +164,10 @@ class Plan:
     masks: bool = False
     variable_rate: bool = False
     excavator_mesh: Path | None = None
+    stature_m: float = MEAN_STATURE_M
+    stooping: float = 0.0
+    devices: bool = False
+    camera: int = 1
 
     @property
     def duration_s(self) -> float:
@@ -173,6 +182,9 @@ def plan_clip(
     masks: bool = False,
     variable_rate: bool = False,
     excavator_mesh: Path | None = None,
+    stature_m: float = MEAN_STATURE_M,
+    stooping: float = 0.0,
+    devices: bool = False,
     **changes: float | None,
 ) -> Plan:
     """Look up a preset and change it.
@@ -183,6 +195,9 @@ def plan_clip(
         masks: Whether masks go into the annotations.
         variable_rate: Whether the time between frames varies.
         excavator_mesh: Folder of parts in place of the procedural excavators, or None.
+        stature_m: Mean of the workers', barefoot.
+        stooping: Share of the workers who work bent over for much of the time.
+        devices: Whether wearables report positions.
         changes: Fields of `Preset` with new values; None leaves the preset's own.
 
     Raises:
@@ -202,7 +217,9 @@ def plan_clip(
     _check("frames a second", preset.fps, 1, 240)
     _check("altitude in m", preset.altitude_m, 5, 200)
     _check("pitch in degrees", preset.pitch_deg, 10, 90)
-    return Plan(name, preset, seed, masks, variable_rate, excavator_mesh)
+    _check("mean stature in m", stature_m, 1.4, 2.1)
+    _check("share of workers who stoop", stooping, 0, 1)
+    return Plan(name, preset, seed, masks, variable_rate, excavator_mesh, stature_m, stooping, devices)
 
 
 def check_seed(seed: int) -> None:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Generator
-from contextlib import closing, contextmanager
-from dataclasses import asdict
+from collections.abc import Callable, Generator, Sequence
+from contextlib import AbstractContextManager, ExitStack, closing, contextmanager
+from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import pyarrow as pa
@@ -21,25 +21,31 @@ from standoff.core.homography import FloatArray
 from standoff.core.pose import View
 from standoff.simulation.coco import Annotations
 from standoff.simulation.crew import work_through
+from standoff.simulation.detection_noise import DETECTIONS_SCHEMA, NoisyDetector
 from standoff.simulation.presets import Plan
 from standoff.simulation.scene import Actor, Reference
 from standoff.simulation.sensor import VideoWriter
 from standoff.simulation.site import Site, build_site
 from standoff.simulation.studio import Shot, Studio
-from standoff.simulation.telemetry import ShownSettings, write_telemetry
-from standoff.simulation.truth import FRAMES_SCHEMA, PAIRS_SCHEMA, TRUTH_SCHEMA, Row
+from standoff.simulation.survey import Surveyor
+from standoff.simulation.telemetry import Origin, ShownSettings, write_telemetry
+from standoff.simulation.truth import FRAMES_SCHEMA, PAIRS_SCHEMA, TRUTH_SCHEMA, FrameTruth, Row
+from standoff.simulation.wearables import DEVICES_SCHEMA, report_positions
 from standoff.stages.ground import save_camera
 from standoff.stages.sinks.whole import whole_folder
 
+Made = TypeVar("Made")
+
 FORMAT = 1
-CLIP_FILES = frozenset(
-    {
-        "video.mp4", "truth.parquet", "pairs.parquet", "frames.parquet", "annotations.json", "scene.json",
-        "camera.yaml", "reference.yaml", "telemetry.srt",
-    }
-)  # fmt: skip
-"""What a clip holds."""
 """Of the clip folder; `scene.json` carries it."""
+TABLES = frozenset({"truth.parquet", "pairs.parquet", "frames.parquet", "scene.json", "camera.yaml", "reference.yaml"})
+"""What every clip holds."""
+CLIP_FILES = TABLES | {"video.mp4", "annotations.json", "telemetry.srt", "detections.parquet", "devices.parquet"}
+"""What a clip may hold; which of them it does depends on how it was made."""
+_AHEAD_ROWS = 20_000
+"""Rows that are kept until they are written: hours of site time do not fit into the memory."""
+_EARTH, _DEVICES, _DETECTIONS = 1299709, 32452843, 49979687
+"""With the seed: the streams of the place on Earth and the drone's instruments, of wearables, of noisy detections."""
 
 
 def frame_times_s(plan: Plan) -> FloatArray:
@@ -72,16 +78,13 @@ def record_clip(
         MissingDependency: No OpenGL.
     """
     with whole_folder(out, overwrite=overwrite, own=CLIP_FILES) as folder:
-        site = build_site(plan)
-        times_s = frame_times_s(plan)
-        tables = Tables()
+        site, times_s = build_site(plan), frame_times_s(plan)
         annotations = Annotations()
         size_px = (plan.preset.width_px, plan.preset.height_px)
-        shots = work_through(
-            partial(open_shooter, plan), list(enumerate(times_s.tolist())), processes=min(processes, len(times_s))
-        )
+        shots = _work(open_shooter, plan, times_s, processes)
         rate_bps = None if plan.preset.bit_rate_mbps is None else int(plan.preset.bit_rate_mbps * 1e6)
-        with closing(shots), VideoWriter(folder / "video.mp4", size_px, bit_rate_bps=rate_bps) as video:
+        film = VideoWriter(folder / "video.mp4", size_px, bit_rate_bps=rate_bps)
+        with closing(shots), film as video, Tables(folder) as tables:
             for shot in shots:
                 video.write(shot.image, shot.frame["time_s"])
                 tables.add(shot)
@@ -89,14 +92,69 @@ def record_clip(
                 annotations.add(picture, shot.entities, size_px, shot.ids if plan.masks else None)
                 if on_frame is not None:
                     on_frame()
-        tables.save(folder)
         _save_json(annotations.to_dict(f"standoff {plan.name}, seed {plan.seed}"), folder / "annotations.json")
-        _save_json(describe_scene(plan, site), folder / "scene.json")
-        save_camera(site.camera, folder / "camera.yaml")
-        _save_reference(site.scene.reference, site.scene.flight.view(times_s[0]), folder / "reference.yaml")
-        errors = np.random.default_rng([plan.seed, 1299709])
-        shown = ShownSettings(iso=round(site.sensor.iso), shutter_hz=1 / site.shutter_s)
-        write_telemetry(folder / "telemetry.srt", site.scene.flight, times_s, errors, shown)
+        _save_surroundings(plan, site, times_s, folder)
+
+
+def record_truth(
+    plan: Plan, out: Path, *, overwrite: bool = False, processes: int = 2, on_frame: Callable[[], None] | None = None
+) -> None:
+    """Write a clip's truth, its telemetry and what a detector might find, without a picture.
+
+    Positions are those of the rendered clip, bit for bit; what is visible is approximated, see
+    `standoff.simulation.sights`. There are `detections.parquet` instead of `video.mp4` and `annotations.json`.
+
+    Args:
+        plan: What to write.
+        out: The folder; appears when the clip is whole.
+        overwrite: Replace an existing folder.
+        processes: That work side by side; the result is the same for any number.
+        on_frame: Called after each frame.
+
+    Raises:
+        OutputError: The folder cannot be used.
+    """
+    with whole_folder(out, overwrite=overwrite, own=CLIP_FILES) as folder:
+        site, times_s = build_site(plan), frame_times_s(plan)
+        size_px = (plan.preset.width_px, plan.preset.height_px)
+        detector = NoisyDetector(size_px, np.random.default_rng([plan.seed, _DETECTIONS, plan.camera]))
+        truths = _work(open_surveyor, plan, times_s, processes)
+        with closing(truths), Tables(folder, detected=True) as tables:
+            for truth in truths:
+                found = detector.detect(truth.index, truth.frame["time_s"], truth.entities)
+                tables.add(truth, found)
+                if on_frame is not None:
+                    on_frame()
+        _save_surroundings(plan, site, times_s, folder)
+
+
+def record_cameras(
+    record: Callable[..., None], plan: Plan, out: Path, *, cameras: int, overwrite: bool = False,
+    on_frame: Callable[[], None] | None = None, processes: int = 2,
+) -> None:  # fmt: skip
+    """Write a clip of each of several drones over one scene: `camera-1`, `camera-2` in one folder.
+
+    Args:
+        record: `record_clip` or `record_truth`.
+        plan: Of the first drone; the others see the same scene, at the same times, from other sides.
+        out: The folder; appears when all clips are whole.
+        cameras: How many.
+        overwrite: Replace an existing folder.
+        on_frame: Called after each frame of each drone.
+        processes: That work side by side.
+    """
+    names = [f"camera-{number}" for number in range(1, cameras + 1)]
+    with whole_folder(out, overwrite=overwrite, own=names) as folder:
+        for number, name in enumerate(names, 1):
+            record(replace(plan, camera=number), folder / name, processes=processes, on_frame=on_frame)
+
+
+def _work(
+    factory: Callable[[Plan], AbstractContextManager[Callable[[tuple[int, float]], Made]]], plan: Plan,
+    times_s: FloatArray, processes: int,
+) -> Generator[Made, None, None]:  # fmt: skip
+    jobs = list(enumerate(times_s.tolist()))
+    return work_through(partial(factory, plan), jobs, processes=min(processes, len(jobs)))
 
 
 @contextmanager
@@ -106,25 +164,69 @@ def open_shooter(plan: Plan) -> Generator[Callable[[tuple[int, float]], Shot], N
         yield lambda job: studio.shoot(*job)
 
 
+@contextmanager
+def open_surveyor(plan: Plan) -> Generator[Callable[[tuple[int, float]], FrameTruth], None, None]:
+    """Give a function from a frame's index and time to what is true in it; it draws nothing."""
+    surveyor = Surveyor(build_site(plan))
+    yield lambda job: surveyor.survey(*job)
+
+
 class Tables:
-    """Collect the rows of the clip's three tables."""
+    """Write the rows of a clip's tables as they come; a context manager.
 
-    def __init__(self) -> None:
-        self._entities: list[Row] = []
-        self._pairs: list[Row] = []
-        self._frames: list[Row] = []
+    Args:
+        folder: Where `truth.parquet`, `pairs.parquet` and `frames.parquet` go.
+        detected: Whether `detections.parquet` is written as well.
+    """
 
-    def add(self, shot: Shot) -> None:
+    def __init__(self, folder: Path, *, detected: bool = False) -> None:
+        schemas = {"truth": TRUTH_SCHEMA, "pairs": PAIRS_SCHEMA, "frames": FRAMES_SCHEMA}
+        schemas |= {"detections": DETECTIONS_SCHEMA} if detected else {}
+        self._rows: dict[str, list[Row]] = {name: [] for name in schemas}
+        self._stack = ExitStack()
+        self._writers = {
+            name: self._stack.enter_context(pq.ParquetWriter(folder / f"{name}.parquet", schema))
+            for name, schema in schemas.items()
+        }
+
+    def __enter__(self) -> Tables:
+        return self
+
+    def __exit__(self, failure: type[BaseException] | None, *_: object) -> None:
+        with self._stack:
+            if failure is None:
+                self._flush(least=0)
+
+    def add(self, truth: Shot | FrameTruth, detections: Sequence[Row] = ()) -> None:
         """Add a frame."""
-        self._entities += shot.entities
-        self._pairs += shot.pairs
-        self._frames.append(shot.frame)
+        added = {"truth": truth.entities, "pairs": truth.pairs, "frames": [truth.frame], "detections": detections}
+        for name, rows in self._rows.items():
+            rows += added[name]
+        self._flush(least=_AHEAD_ROWS)
 
-    def save(self, folder: Path) -> None:
-        """Write `truth.parquet`, `pairs.parquet` and `frames.parquet`."""
-        tables = (("truth", TRUTH_SCHEMA, self._entities), ("pairs", PAIRS_SCHEMA, self._pairs))
-        for name, schema, rows in (*tables, ("frames", FRAMES_SCHEMA, self._frames)):
-            pq.write_table(pa.Table.from_pylist(rows, schema=schema), folder / f"{name}.parquet")
+    def _flush(self, *, least: int) -> None:
+        for name, rows in self._rows.items():
+            if len(rows) >= max(least, 1):
+                self._writers[name].write_table(pa.Table.from_pylist(rows, schema=self._writers[name].schema))
+                rows.clear()
+
+
+def _save_surroundings(plan: Plan, site: Site, times_s: FloatArray, folder: Path) -> None:
+    """Write what does not come frame by frame: scene, camera, reference object, telemetry, wearables."""
+    _save_json(describe_scene(plan, site), folder / "scene.json")
+    save_camera(site.camera, folder / "camera.yaml")
+    _save_reference(site.scene.reference, site.scene.flight.view(times_s[0]), folder / "reference.yaml")
+    origin = Origin.draw(np.random.default_rng([plan.seed, _EARTH]))
+    errors = np.random.default_rng([plan.seed, _EARTH])
+    if plan.camera == 1:
+        Origin.draw(errors)  # the errors come after the place, from the same stream
+    else:
+        errors = np.random.default_rng([plan.seed, _EARTH, plan.camera])
+    shown = ShownSettings(iso=round(site.sensor.iso), shutter_hz=1 / site.shutter_s)
+    write_telemetry(folder / "telemetry.srt", site.scene.flight, times_s, errors, shown, origin=origin)
+    if plan.devices:
+        reports = report_positions(site.scene, float(times_s[-1]), origin, np.random.default_rng([plan.seed, _DEVICES]))
+        pq.write_table(pa.Table.from_pylist(reports, schema=DEVICES_SCHEMA), folder / "devices.parquet")
 
 
 def describe_scene(plan: Plan, site: Site) -> dict[str, Any]:
@@ -137,6 +239,9 @@ def describe_scene(plan: Plan, site: Site) -> dict[str, Any]:
         "preset": plan.name,
         **{name: value for name, value in asdict(plan.preset).items() if name not in ("summary", "covers")},
         "variable_rate": plan.variable_rate,
+        "stature_m": plan.stature_m,
+        "stooping": plan.stooping,
+        "camera": plan.camera,
         "entities": [_describe_actor(actor) for actor in scene.actors],
         "reference": None if scene.reference is None else _describe_reference(scene.reference),
         "board": None
@@ -161,6 +266,8 @@ def _describe_reference(reference: Reference) -> dict[str, Any]:
         "entity_id": reference.entity_id,
         "top_m": reference.top_m.tolist(),
         "base_m": reference.base_m.tolist(),
+        "ground_m": reference.ground_m,
+        "height_m": reference.height_m,
         "covers": [{"start_s": cover.start_s, "stop_s": cover.stop_s} for cover in reference.covers],
     }
 
@@ -172,7 +279,8 @@ def _save_reference(reference: Reference | None, view: View, path: Path) -> None
         first_px = view.project(reference.top_m[:1])[0]
         size_px = (view.camera.width_px, view.camera.height_px)
         hint = {"first_corner_px": first_px.tolist()} if ((first_px >= 0) & (first_px < size_px)).all() else {}
-        ground["reference"] = {"corners_m": reference.top_m[:, :2].tolist(), **hint}
+        shape = {"corners_m": reference.top_m[:, :2].tolist(), "height_m": reference.height_m}
+        ground["reference"] = {**shape, **hint}
     path.write_text(yaml.safe_dump({"ground": ground}, sort_keys=False))
 
 

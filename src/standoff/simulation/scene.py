@@ -215,6 +215,16 @@ class Reference:
     covers: tuple[Cover, ...]
     entity_id: int
 
+    @property
+    def ground_m(self) -> float:
+        """Return the mean height, in the site frame, of the ground that its corners stand on."""
+        return float(self.base_m[:, 2].mean())
+
+    @property
+    def height_m(self) -> float:
+        """Return how high its top is above that ground."""
+        return float(self.top_m[:, 2].mean()) - self.ground_m
+
 
 class Flight(Protocol):
     """The camera's way through the air."""

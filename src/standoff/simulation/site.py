@@ -10,7 +10,7 @@ import shapely
 
 from standoff.core.camera import Camera
 from standoff.core.homography import FloatArray
-from standoff.simulation.casting import CASTS, Cast, Stage
+from standoff.simulation.casting import CASTS, Cast, Stage, bend_over
 from standoff.simulation.covers import make_cover
 from standoff.simulation.flight import drone_camera, make_flight
 from standoff.simulation.layout import lay_out
@@ -45,6 +45,9 @@ _CRANE_SHARE = 0.5
 _CRANE_TRIES = 12
 _CRANE_FOOT_M = 4.2
 _JIB_AWAY_M = 9.0
+_OTHER_FLIGHTS = 15485863
+"""With the seed and the camera's number: the stream of everything that sets further drones apart."""
+_AROUND_DEG = (60.0, 120.0)
 _METERED = (0.18, 0.29)
 """Linear picture value of level ground in the open; clutter and shadows are darker."""
 _METER_ALBEDO = 0.23
@@ -87,7 +90,19 @@ def build_site(plan: Plan) -> Site:
     """
     preset = plan.preset
     # a stream for each part: a change of one leaves the others as they were
-    names = ("cast", "ground", "reference", "props", "surroundings", "light", "camera", "flight", "look", "crane")
+    names = (
+        "cast",
+        "ground",
+        "reference",
+        "props",
+        "surroundings",
+        "light",
+        "camera",
+        "flight",
+        "look",
+        "crane",
+        "people",
+    )
     streams = np.random.SeedSequence(plan.seed).spawn(len(names))
     rng = {name: np.random.default_rng(stream) for name, stream in zip(names, streams, strict=True)}
 
@@ -96,13 +111,15 @@ def build_site(plan: Plan) -> Site:
     duration_s = plan.duration_s * 1.3 + 1.0  # a variable rate takes longer than the nominal one
     scale = max(1.0, preset.altitude_m / 25.0)
     reference_m = None if preset.shape is None else preset.reference_offset_m
-    stage = Stage(heading_deg, scale, duration_s, plan.excavator_mesh, reference_m)
+    stage = Stage(heading_deg, scale, duration_s, plan.excavator_mesh, reference_m, plan.stature_m)
     cast = CASTS[preset.cast](rng["cast"], stage)
+    bend_over(rng["people"], cast, plan.stooping)
     flight = make_flight(
         rng["flight"], preset.motion, camera, target_xy_m=np.zeros(2), altitude_m=preset.altitude_m,
         pitch_deg=preset.pitch_deg, heading_deg=heading_deg, duration_s=plan.duration_s,
     )  # fmt: skip
     reference_xy_m = stage.place(*preset.reference_offset_m).xy_m
+    filming = flight if plan.camera == 1 else _fly_elsewhere(plan, camera, heading_deg)
     ground = _shape_ground(rng["ground"], preset, cast, reference_xy_m)
     reference = _place_reference(rng["reference"], plan, reference_xy_m, heading_deg, ground)
     light = random_light(rng["light"], preset.condition)
@@ -115,7 +132,7 @@ def build_site(plan: Plan) -> Site:
     outside, parked = _number_parked(make_surroundings(rng["surroundings"], ground, shade_to_sun=shade))
     props += outside + parked
     return Site(
-        Scene(plan.name, plan.seed, ground, props, tuple(cast.actors), parked, reference, light, flight),
+        Scene(plan.name, plan.seed, ground, props, tuple(cast.actors), parked, reference, light, filming),
         camera,
         _develop(rng["look"], light, ground, preset.altitude_m / np.sin(np.deg2rad(preset.pitch_deg))),
         Sensor.draw(rng["look"], preset.condition),
@@ -123,6 +140,19 @@ def build_site(plan: Plan) -> Site:
         duration_s,
         board_corners_m(reference) if reference is not None and preset.shape == "board" else None,
     )
+
+
+def _fly_elsewhere(plan: Plan, camera: Camera, heading_deg: float) -> Flight:
+    """Draw the flight of another drone, which sees the same middle of the site from 60 to 120 degrees around."""
+    preset = plan.preset
+    rng = np.random.default_rng([plan.seed, _OTHER_FLIGHTS, plan.camera])
+    return make_flight(
+        rng, preset.motion, camera, target_xy_m=rng.uniform(-1.5, 1.5, 2),
+        altitude_m=preset.altitude_m * float(rng.uniform(0.9, 1.25)),
+        pitch_deg=float(np.clip(preset.pitch_deg + rng.uniform(-4.0, 6.0), 20.0, 90.0)),
+        heading_deg=heading_deg + float(rng.choice([-1.0, 1.0]) * rng.uniform(*_AROUND_DEG)),
+        duration_s=plan.duration_s,
+    )  # fmt: skip
 
 
 def _shape_ground(rng: np.random.Generator, preset: Preset, cast: Cast, reference_xy_m: FloatArray) -> Terrain:

@@ -17,7 +17,8 @@ from standoff.simulation.band_noise import BandNoise
 from standoff.simulation.scene import Flight
 
 _EQUATOR_M, _FLATTENING = 6_378_137.0, 1 / 298.257223563  # WGS84
-_DRIFT_BAND_HZ = (0.002, 0.02)  # what GPS and barometer wander by within minutes
+DRIFT_BAND_HZ = (0.002, 0.02)
+"""What GPS and barometer wander by within minutes."""
 _FULL_FRAME_WIDTH_MM = 36.0
 
 
@@ -89,12 +90,12 @@ class TelemetryErrors:
     def draw(cls, rng: np.random.Generator) -> TelemetryErrors:
         """Draw one flight's errors."""
         direction_rad = rng.uniform(0.0, 2 * np.pi)
-        east, north = (BandNoise.draw(rng, _DRIFT_BAND_HZ, 0.1) for _ in range(2))
+        east, north = (BandNoise.draw(rng, DRIFT_BAND_HZ, 0.1) for _ in range(2))
         return cls(
             rng.uniform(0.6, 1.5) * np.array([np.cos(direction_rad), np.sin(direction_rad)]),
             (east, north),
             float(rng.choice([-1.0, 1.0]) * rng.uniform(0.3, 0.8)),
-            BandNoise.draw(rng, _DRIFT_BAND_HZ, 0.05),
+            BandNoise.draw(rng, DRIFT_BAND_HZ, 0.05),
             float(rng.choice([-1.0, 1.0]) * rng.uniform(1.0, 3.0)),
             float(rng.uniform(-0.2, 0.2)),
             float(rng.uniform(-0.2, 0.2)),
@@ -112,18 +113,20 @@ class ShownSettings:
 
 
 def write_telemetry(
-    path: Path, flight: Flight, times_s: FloatArray, rng: np.random.Generator, settings: ShownSettings | None = None
-) -> None:
+    path: Path, flight: Flight, times_s: FloatArray, rng: np.random.Generator, settings: ShownSettings | None = None,
+    *, origin: Origin | None = None,
+) -> None:  # fmt: skip
     """Write one block a frame.
 
     Args:
         path: The file, usually `telemetry.srt`.
         flight: The true one.
         times_s: (N,) presentation times of the frames.
-        rng: Decides on the place on Earth, the hour and the errors.
+        rng: Decides on the errors, and before them on the place on Earth and the hour unless they are given.
         settings: Of the camera.
+        origin: The place and the hour, where another drone has them already.
     """
-    origin, errors = Origin.draw(rng), TelemetryErrors.draw(rng)
+    origin, errors = origin or Origin.draw(rng), TelemetryErrors.draw(rng)
     settings = settings or ShownSettings()
     ends_s = np.append(times_s[1:], times_s[-1] + (times_s[-1] - times_s[-2] if len(times_s) > 1 else 1 / 30))
     blocks = [

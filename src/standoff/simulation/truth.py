@@ -7,6 +7,7 @@ goes from i - 0.5 to j + 0.5.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from itertools import combinations
 from typing import Any
@@ -57,6 +58,41 @@ FRAMES_SCHEMA = pa.schema(
     + [("board_x_px", _FLOATS), ("board_y_px", _FLOATS)]
 )
 """One row per frame: the camera and the reference object."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sight:
+    """How one entity shows in one picture.
+
+    Attributes:
+        box_px: (4,) around what is visible inside the picture; NaN when nothing is.
+        full_px: (4,) around the whole, through everything in front and beyond the picture's edge; NaN when a part of
+            it is behind the camera or outside the lens model.
+        visible_px: Visible pixels.
+        visible_share: Their share of the whole silhouette.
+    """
+
+    box_px: FloatArray
+    full_px: FloatArray
+    visible_px: int
+    visible_share: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrameTruth:
+    """All that is true in one frame.
+
+    Attributes:
+        index: Of the frame.
+        entities: Rows of `TRUTH_SCHEMA`.
+        pairs: Rows of `PAIRS_SCHEMA`.
+        frame: Row of `FRAMES_SCHEMA`.
+    """
+
+    index: int
+    entities: list[Row]
+    pairs: list[Row]
+    frame: Row
 
 
 @lru_cache(maxsize=4096)
@@ -124,21 +160,22 @@ def entity_rows(frame: int, moment: Moment, ids: IdArray, silhouette_px: Callabl
     everybody = (*moment.bodies, *moment.parked)
     boxes, sizes = visible_boxes_px(ids, max((body.entity_id for body in everybody), default=0))
     shown = (*moment.bodies, *(body for body in moment.parked if sizes[body.entity_id]))
-    return [
-        _entity_row(frame, moment, body, boxes[body.entity_id], int(sizes[body.entity_id]), silhouette_px)
-        for body in shown
-    ]
+    rows = []
+    for body in shown:
+        visible_px = int(sizes[body.entity_id])
+        whole_px = max(silhouette_px(body), visible_px) if visible_px else 0
+        full_px = full_box_px(body.batches, moment.view)
+        sight = Sight(boxes[body.entity_id], full_px, visible_px, visible_px / whole_px if whole_px else 0.0)
+        rows.append(entity_row(frame, moment, body, sight, moment.view.project(body.centre_m[None])[0]))
+    return rows
 
 
-def _entity_row(
-    frame: int, moment: Moment, body: Body, box_px: FloatArray, visible_px: int, silhouette_px: Callable[[Body], int]
-) -> Row:
-    whole_px = max(silhouette_px(body), visible_px) if visible_px else 0
-    foot_px = moment.view.project(body.centre_m[None])[0]
+def entity_row(frame: int, moment: Moment, body: Body, sight: Sight, foot_px: FloatArray) -> Row:
+    """Return one row of `TRUTH_SCHEMA`; `foot_px` (2,) is where the body's centre appears."""
     heading_deg = float(np.rad2deg(np.pi / 2 - body.heading_rad) % 360.0)
     numbers = [
-        *body.centre_m, heading_deg, *body.velocity_mps, *body.tip_m, *box_px,
-        *full_box_px(body.batches, moment.view), visible_px / whole_px if whole_px else 0.0, *foot_px,
+        *body.centre_m, heading_deg, *body.velocity_mps, *body.tip_m, *sight.box_px, *sight.full_px,
+        sight.visible_share, *foot_px,
     ]  # fmt: skip
     return {
         "frame": frame,
@@ -146,7 +183,7 @@ def _entity_row(
         "entity_id": body.entity_id,
         "class_id": body.class_id,
         "class_name": CLASSES[body.class_id].name,
-        "visible_px": visible_px,
+        "visible_px": sight.visible_px,
         **dict(zip(_SCALARS, map(float, numbers), strict=True)),
         "footprint_x_m": body.footprint_m[:, 0].tolist(),
         "footprint_y_m": body.footprint_m[:, 1].tolist(),

@@ -14,9 +14,11 @@ from standoff.core import homography
 from standoff.core.camera import Camera
 from standoff.core.errors import GroundError
 from standoff.core.homography import FloatArray
-from standoff.core.types import Detections, Frame, GroundMap, ImageArray, NoGroundMap
+from standoff.core.types import Detections, Frame, GroundMap, ImageArray, NoCameraMotion, NoGroundMap
 from standoff.stages.ground.survey_file import load_survey
 from standoff.stages.ground.surveyed import SurveyedGround
+
+STILL = NoCameraMotion("not estimated")
 
 _SIZE = (1280, 720)
 _MATRIX = np.array([[1000.0, 0, 640.0], [0, 1000.0, 360.0], [0, 0, 1]])
@@ -58,7 +60,7 @@ def seen(points_m: FloatArray, camera: Camera) -> FloatArray:
 
 
 def updated(ground: SurveyedGround, width_px: int = _SIZE[0], height_px: int = _SIZE[1]) -> GroundMap:
-    result = ground.update(blank_frame(width_px, height_px), Detections.empty())
+    result = ground.update(blank_frame(width_px, height_px), Detections.empty(), STILL)
     assert isinstance(result, GroundMap)
     return result
 
@@ -190,7 +192,7 @@ def test_the_scale_is_metres_per_pixel_at_the_middle_of_the_points() -> None:
 
 def test_every_frame_gets_the_same_map() -> None:
     ground = SurveyedGround(seen(_POINTS_M, _LENS), _POINTS_M, _SIZE, camera=_LENS)
-    maps = [ground.update(blank_frame(*_SIZE, index), Detections.empty()) for index in range(3)]
+    maps = [ground.update(blank_frame(*_SIZE, index), Detections.empty(), STILL) for index in range(3)]
     assert all(one is maps[0] for one in maps)
     np.testing.assert_array_equal(updated(ground).anchors_px, seen(_POINTS_M, _LENS))
     assert updated(ground).method == "surveyed"
@@ -214,7 +216,7 @@ def test_a_frame_of_another_size_gets_the_map_scaled_to_it(factor: float) -> Non
 
 def test_a_frame_of_another_shape_has_no_map() -> None:
     ground = SurveyedGround(seen(_POINTS_M, _LENS), _POINTS_M, _SIZE)
-    result = ground.update(blank_frame(1280, 960), Detections.empty())
+    result = ground.update(blank_frame(1280, 960), Detections.empty(), STILL)
     assert isinstance(result, NoGroundMap)
     assert result.reason == "picture size differs from the survey"
 

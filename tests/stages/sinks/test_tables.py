@@ -14,7 +14,7 @@ import pytest
 from stages.sinks.fake_site import FakeSite
 
 from standoff.core.types import FrameResult, NoGroundMap, Outcome, Proximities, Tracks
-from standoff.stages.sinks import FRAMES, PROXIMITY, TRACKS, Table, TableParams, TableSink
+from standoff.stages.sinks import DETECTIONS, FRAMES, PROXIMITY, TRACKS, Table, TableParams, TableSink
 
 TRACK_COLUMNS = [
     "stream_id",
@@ -121,7 +121,7 @@ def test_every_frame_has_a_row_also_without_map_and_tracks(tmp_path: Path, resul
     assert rows[2]["image_to_ground"] is None
 
 
-@pytest.mark.parametrize("table", [TRACKS, PROXIMITY, FRAMES])
+@pytest.mark.parametrize("table", [TRACKS, PROXIMITY, FRAMES, DETECTIONS])
 def test_parts_make_no_difference(tmp_path: Path, results: list[FrameResult], table: Table) -> None:
     (tmp_path / "whole").mkdir()
     (tmp_path / "parts").mkdir()
@@ -131,14 +131,14 @@ def test_parts_make_no_difference(tmp_path: Path, results: list[FrameResult], ta
     assert [path.name for path in (tmp_path / "parts").iterdir()] == ["table.parquet"]
 
 
-@pytest.mark.parametrize("table", [TRACKS, PROXIMITY, FRAMES])
+@pytest.mark.parametrize("table", [TRACKS, PROXIMITY, FRAMES, DETECTIONS])
 def test_a_run_without_frames_leaves_an_empty_table(tmp_path: Path, table: Table) -> None:
     read = pq.read_table(_written(tmp_path, table, []))
     assert read.num_rows == 0
     assert read.column_names == table.schema.names
 
 
-@pytest.mark.parametrize("table", [TRACKS, PROXIMITY, FRAMES])
+@pytest.mark.parametrize("table", [TRACKS, PROXIMITY, FRAMES, DETECTIONS])
 def test_columns_say_their_unit_and_meaning(tmp_path: Path, results: list[FrameResult], table: Table) -> None:
     schema = pq.read_schema(_written(tmp_path, table, results[:3]))
     assert schema.metadata[b"standoff_version"]

@@ -8,12 +8,14 @@ from typing import Any, Literal
 
 import numpy as np
 
+from standoff.clips import is_recording
 from standoff.config import Settings, build_stage, load_settings
 from standoff.core.errors import DataError
 from standoff.core.protocols import Detector, Tracker
 from standoff.evaluation.paper.clip import Clip, TrueReference
 from standoff.evaluation.paper.truth_detector import REFERENCE_MARGIN_PX, BoxError, TrueBoxes
 from standoff.pipeline import Pipeline
+from standoff.stages.detect import RecordedDetector
 from standoff.stages.frames import Source
 from standoff.stages.ground import ReferenceShape
 from standoff.stages.ground.params import ReferenceMethod
@@ -27,7 +29,7 @@ class Trial:
     Attributes:
         method: How the reference's corners are found. With "paper" everything is as printed: the centre of the box,
             its outlier filter, lens distortion left in the picture. Otherwise the clip's camera file removes it.
-        detector: "truth", "noisy", or a model.
+        detector: "truth", "noisy", a model, or a run of the clip (its folder or its table of detections) to replay.
         anchor: Point of the box that stands for an entity; None: the centre with "paper", standoff's default otherwise.
         box_error: For "noisy".
         seed: For "noisy".
@@ -49,13 +51,18 @@ class Trial:
         """Whether lens distortion is removed."""
         return self.method != "paper"
 
+    def _detector_name(self) -> str:
+        if isinstance(self.detector, str):
+            return self.detector
+        name = self.detector.resolve().name
+        return f"recorded in {name}" if is_recording(self.detector) else name
+
     def describe(self) -> dict[str, Any]:
         """Return what was tried, for people and machines."""
-        detector = self.detector if isinstance(self.detector, str) else self.detector.name
         about: dict[str, Any] = {
             "method": self.method,
             "anchor": self.anchor_used,
-            "detector": detector,
+            "detector": self._detector_name(),
             "lens distortion removed": self.knows_lens,
             "outlier filter": "paper",
         }
@@ -78,7 +85,7 @@ def build_monitor(clip: Clip, trial: Trial, source: Source) -> Pipeline:
 
     Raises:
         DataError: There is no reference object.
-        StandoffError: The model cannot be used, or the clip's own files are broken.
+        StandoffError: The model or the recorded detections cannot be used, or the clip's own files are broken.
     """
     settings = settings_for(clip, trial)
     detector: Detector
@@ -86,12 +93,15 @@ def build_monitor(clip: Clip, trial: Trial, source: Source) -> Pipeline:
     if isinstance(trial.detector, Path):
         detector, tracker = build_stage("detect", settings), build_stage("track", settings)
         _check_reference_class(detector, trial.detector)
+        if isinstance(detector, RecordedDetector):
+            detector.check_source(source.description)
     else:
         detector = tracker = TrueBoxes(clip, trial.box_error if trial.detector == "noisy" else None, trial.seed)
     return Pipeline(
         frames=source,
         detector=detector,
-        ground=build_stage("ground", settings),
+        motion=build_stage("motion", settings),
+        ground=build_stage("ground", settings, source.camera_prior),
         tracker=tracker,
         locator=build_stage("locate", settings),
         proximity=build_stage("proximity", settings),
@@ -122,7 +132,7 @@ def settings_for(clip: Clip, trial: Trial) -> Settings:
         "proximity": {"outlier_filter": "paper"},
     }
     if isinstance(trial.detector, Path):
-        overrides["model"] = str(trial.detector)
+        overrides["detections" if is_recording(trial.detector) else "model"] = str(trial.detector)
     return load_settings(clip.folder / "reference.yaml", overrides)
 
 
@@ -138,8 +148,9 @@ def _first_corner_px(clip: Clip, reference: TrueReference) -> list[float] | None
 
 
 def _check_reference_class(detector: Detector, model: Path) -> None:
-    classes = getattr(detector, "description", {}).get("class_map", {}).values()
-    if "reference" not in classes:
+    class_map = getattr(detector, "description", {}).get("class_map")
+    # A detector of somebody's own, replayed, may not say what it knows.
+    if class_map is not None and "reference" not in class_map.values():
         raise DataError(
             expected="a model with a class `reference`, which tells where the reference object is",
             found=f"{model} without one",

@@ -9,6 +9,7 @@ import numpy as np
 
 from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.homography import FloatArray
+from standoff.core.protocols import AnyMotion
 from standoff.core.types import Detections, Frame, Tracks
 from standoff.evaluation.paper.clip import Clip
 
@@ -75,8 +76,8 @@ class TrueBoxes:
         class_id = np.concatenate([self._clip.class_id[self._shown], reference_id])
         return Detections(xyxy_px, np.ones(len(xyxy_px)), class_id)
 
-    def update(self, time_s: float, detections: Detections) -> Tracks:
-        """Return the last detections as tracks; the reference object is none."""
+    def update(self, time_s: float, detections: Detections, motion: AnyMotion) -> Tracks:
+        """Return the last detections as tracks; the reference object is none, and motion plays no part."""
         own = without_reference(detections)
         track_id = self._clip.entity_id[self._shown]
         for entity_id in track_id.tolist():
@@ -90,7 +91,7 @@ class TrueBoxes:
             age_s=np.array([time_s - self._first_s[entity_id] for entity_id in track_id.tolist()]),
         )
 
-    def coast(self, time_s: float) -> Tracks:
+    def coast(self, time_s: float, motion: AnyMotion) -> Tracks:
         """Return nothing: the truth is asked in every frame."""
         return Tracks.empty()
 

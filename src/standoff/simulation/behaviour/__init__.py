@@ -15,7 +15,13 @@ from standoff.simulation.behaviour.earthmoving import (
     spreading,
 )
 from standoff.simulation.behaviour.encounters import crossing_behind, keep_distance, near_miss
-from standoff.simulation.behaviour.people import carrying_between, pair_talking, standing_working, walking_past
+from standoff.simulation.behaviour.people import (
+    carrying_between,
+    pair_talking,
+    standing_working,
+    stooping,
+    walking_past,
+)
 from standoff.simulation.behaviour.stances import random_stance
 
 __all__ = [
@@ -34,6 +40,7 @@ __all__ = [
     "rolling",
     "spreading",
     "standing_working",
+    "stooping",
     "truck_loading",
     "walking_past",
 ]

@@ -28,6 +28,9 @@ WALKING_MPS = (0.8, 1.5)
 """Free walking is 1.2-1.5 m/s, slower over rough ground and with loads."""
 
 _TURN_DPS = 150.0
+_STOOPED_DEG = (45.0, 85.0)
+_STROLL_MPS = 0.5
+"""Whoever walks this fast looks where they go."""
 
 
 def walking_past(
@@ -138,6 +141,32 @@ def _handling(rng: np.random.Generator, standing: Motion, carried_after: float) 
         "speed_mps": [(0.0, 0.0)],
     }
     return with_joints(motion, keys)
+
+
+def stooping(rng: np.random.Generator, motion: Motion) -> Motion:
+    """Let a worker do what they do bent over for much of the time, as in laying bricks, tying steel or shovelling.
+
+    They come up for a moment now and then, and lean forward less on the way to somewhere. Where they are and when
+    stays as it is.
+
+    Args:
+        rng: Decides when and how low.
+        motion: Of a worker who works upright.
+    """
+    bend: list[Key] = []
+    now_s, end_s = -rng.uniform(0.0, 8.0), float(motion.time_s[-1])
+    while now_s < end_s:
+        low_deg, stays_s = float(rng.uniform(*_STOOPED_DEG)), float(rng.uniform(6.0, 20.0))
+        bend += [(now_s, low_deg), (now_s + stays_s, low_deg)]
+        upright_s = now_s + stays_s + 1.2
+        now_s = upright_s + rng.uniform(0.5, 3.0)
+        bend += [(upright_s, 5.0), (now_s, 5.0)]
+        now_s += 1.2
+    still = np.zeros(len(motion.time_s))
+    speed_mps = motion.joints.get("speed_mps", still)
+    bent_deg = eased(motion.time_s, bend) * (1.0 - 0.7 * np.clip(speed_mps / _STROLL_MPS, 0.0, 1.0))
+    bent_deg = np.maximum(bent_deg, motion.joints.get("bend_deg", still))
+    return replace(motion, joints={**motion.joints, "bend_deg": bent_deg})
 
 
 def _in_place(place: Place, duration_s: float, tracks: dict[str, list[Key]], heading: list[Key]) -> Motion:

@@ -19,6 +19,7 @@ from standoff.simulation.mesh import (
     Mesh,
     Surface,
     box,
+    crossed,
     cylinder,
     join,
     lathe,
@@ -39,7 +40,7 @@ def strut_pose(start_m: FloatArray | Point, end_m: FloatArray | Point) -> FloatA
     left = np.array([-ahead[1], ahead[0], 0.0]) if np.hypot(ahead[0], ahead[1]) > 1e-6 else np.array([0.0, 1.0, 0.0])
     left /= np.linalg.norm(left) if left[1] >= 0.0 else -np.linalg.norm(left)
     pose = np.eye(4)
-    pose[:3] = np.column_stack([ahead, left, np.cross(ahead, left), start])
+    pose[:3] = np.column_stack([ahead, left, crossed(ahead, left), start])
     return pose
 
 

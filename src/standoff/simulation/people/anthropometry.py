@@ -24,6 +24,9 @@ SHOULDER_JOINT_Y = 0.100
 REFERENCE_STATURE_M = 1.75
 """All body meshes are modelled at this stature and scaled by the pose."""
 
+MEAN_STATURE_M = 1.75
+"""Of the workers of a site, barefoot, unless somebody wants others."""
+
 
 @dataclass(frozen=True, slots=True)
 class Body:

@@ -15,6 +15,7 @@ from standoff.simulation.mesh import (
     Surface,
     ball,
     box,
+    crossed,
     cylinder,
     join,
     lathe,
@@ -156,7 +157,7 @@ def _hold_shaft(bearer: Bearer, top_m: FloatArray, share: float) -> Grip:
     side = np.array([-ahead[1], ahead[0], 0.0])
     side /= np.linalg.norm(side)
     pose = np.eye(4)
-    pose[:3, :3] = np.column_stack([np.cross(side, -down), side, -down])
+    pose[:3, :3] = np.column_stack([crossed(side, -down), side, -down])
     pose[:3, 3] = tail_m
     return pose, np.array([top_m + down * share * length_m, top_m])
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from standoff.core.homography import FloatArray
-from standoff.simulation.mesh import rotation, scaling, translation
+from standoff.simulation.mesh import crossed, rotation, scaling, translation
 from standoff.simulation.people import anthropometry as ratio
 from standoff.simulation.people.anthropometry import Body
 from standoff.simulation.people.gait import Footing, Sole, amplitude, arm_swing_deg, ease, footing
@@ -187,10 +187,10 @@ def limb(root_m: FloatArray, end_m: FloatArray, front: FloatArray) -> FloatArray
     """Return the (4, 4) frame of a limb that hangs from `root_m` along its own -z, x as near to `front` as possible."""
     up = root_m - end_m
     up = up / np.linalg.norm(up)
-    left = np.cross(up, front)
+    left = crossed(up, front)
     left /= np.linalg.norm(left)
     frame = np.eye(4)
-    frame[:3, :3] = np.column_stack([np.cross(left, up), left, up])
+    frame[:3, :3] = np.column_stack([crossed(left, up), left, up])
     frame[:3, 3] = root_m
     return frame
 

@@ -12,7 +12,7 @@ from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.homography import FloatArray
 from standoff.simulation.mesh import Colour
 from standoff.simulation.people import carried, clothing
-from standoff.simulation.people.anthropometry import Body
+from standoff.simulation.people.anthropometry import MEAN_STATURE_M, Body
 from standoff.simulation.people.dressing import worn
 from standoff.simulation.people.gait import ease, step_length_m
 from standoff.simulation.people.outfit import Outfit, choose_outfit
@@ -29,6 +29,8 @@ JOINTS: Mapping[str, tuple[float, float]] = {
     "act": (0.0, 1.0),
 }
 """Allowed range of each joint of every worker."""
+_TALLER_M = 0.20
+"""Nobody is taller or shorter than the mean by more."""
 _HOLDING = 0.5
 _EIGHTHS_RAD = np.deg2rad(22.5 + 45.0 * np.arange(8))
 _FOOTPRINT_M = np.column_stack([0.25 * np.cos(_EIGHTHS_RAD), 0.225 * np.sin(_EIGHTHS_RAD)]) / np.cos(np.pi / 8)
@@ -178,15 +180,19 @@ def _build(girth: float) -> str:
     return clothing.BUILDS[int(np.digitize(girth, [0.95, 1.08]))]
 
 
-def make_worker(rng: np.random.Generator, *, outfit: Outfit | None = None) -> Worker:
+def make_worker(
+    rng: np.random.Generator, *, outfit: Outfit | None = None, mean_stature_m: float = MEAN_STATURE_M
+) -> Worker:
     """Return somebody who works here; the same generator state gives the same person.
 
     Args:
         rng: Source of everything random.
         outfit: Clothes to wear instead of random ones.
+        mean_stature_m: Of all who could work here, barefoot; another mean changes sizes and nothing else.
     """
     chosen = choose_outfit(rng)
-    stature_m = float(np.clip(rng.normal(1.75, 0.075), 1.55, 1.95))
+    low_m, high_m = mean_stature_m - _TALLER_M, mean_stature_m + _TALLER_M
+    stature_m = float(np.clip(rng.normal(mean_stature_m, 0.075), low_m, high_m))
     body = Body(stature_m, float(np.clip(rng.normal(1.0, 0.09), 0.84, 1.22)), float(rng.uniform(0.985, 1.015)))
     habits = Habits(
         pace_mps=float(rng.uniform(0.95, 1.5)),

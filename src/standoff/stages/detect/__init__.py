@@ -8,6 +8,7 @@
 from standoff.stages.detect.class_map import DEFAULT_CLASS_MAP
 from standoff.stages.detect.detector import OnnxDetector
 from standoff.stages.detect.params import DetectParams
+from standoff.stages.detect.recorded import RecordedDetector
 from standoff.stages.detect.runtime import available_providers
 from standoff.stages.detect.shipped import SHIPPED_MODELS, ShippedModel, find_model
 
@@ -16,6 +17,7 @@ __all__ = [
     "SHIPPED_MODELS",
     "DetectParams",
     "OnnxDetector",
+    "RecordedDetector",
     "ShippedModel",
     "available_providers",
     "find_model",

@@ -82,6 +82,7 @@ class Header:
         duration_s: Of the video; None when the file speaks only of all streams together, or not at all.
         rate_fps: Average pictures a second; 0 when unknown.
         created_at: Aware UTC, or None. Some cameras write their local time here, as if it were UTC.
+        camera_names: What may be the camera's model; drones write it under several keys.
     """
 
     container: str
@@ -91,6 +92,7 @@ class Header:
     duration_s: float | None
     rate_fps: float
     created_at: datetime | None
+    camera_names: tuple[str, ...]
 
     @classmethod
     def of(cls, container: InputContainer, stream: VideoStream) -> Header:
@@ -103,6 +105,7 @@ class Header:
             duration_s=_duration_s(container, stream),
             rate_fps=float(stream.average_rate or stream.guessed_rate or 0.0),
             created_at=_creation_time(container, stream),
+            camera_names=(*container.metadata.values(), *stream.metadata.values()),
         )
 
     @property

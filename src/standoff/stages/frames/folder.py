@@ -13,6 +13,9 @@ from typing import Any
 import av
 
 from standoff.core.errors import SourceError
+from standoff.stages.frames.album import read_album
+from standoff.stages.frames.fingerprint import fingerprint
+from standoff.stages.frames.photograph import read_photograph
 from standoff.stages.frames.pictures import AvPicture, Scaler
 from standoff.stages.frames.reader import TIME_ROUNDING_S, Shot, check_size
 
@@ -91,6 +94,7 @@ class FolderReader:
     """
 
     started_at: datetime | None = None
+    rotation_deg = 0
 
     def __init__(self, folder: Path, fps: float | None) -> None:
         if fps is None:
@@ -106,6 +110,10 @@ class FolderReader:
         self.size_px = (first.width_px, first.height_px)
         self.total_frames: int | None = len(self._paths)
         self.rate_fps = fps
+        album = read_album(self._paths)
+        self.drone = album.drone
+        self.camera_prior = album.camera_prior(self.size_px)
+        self.warnings = album.warnings
 
     def shots(self, start_s: float, every: int) -> Iterator[Shot]:
         """Yield every `every`-th image from `start_s` on; the others are not even opened."""
@@ -114,7 +122,8 @@ class FolderReader:
             path = self._paths[index]
             picture = _decode(path, self._scaler)
             check_size(picture, self.size_px, path.name)
-            yield Shot(index, index / self.rate_fps, picture, path.name)
+            time_s = index / self.rate_fps
+            yield Shot(index, time_s, picture, path.name, read_photograph(path, time_s).telemetry)
 
     @property
     def description(self) -> dict[str, Any]:
@@ -125,6 +134,7 @@ class FolderReader:
             "size_px": list(self.size_px),
             "fps": self.rate_fps,
             "duration_s": len(self._paths) / self.rate_fps,
+            "fingerprint": fingerprint(self._paths),
             "frames_declared": len(self._paths),
             "clock": "given frame rate",
         }

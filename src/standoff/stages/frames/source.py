@@ -16,11 +16,13 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple, Self
 
+from standoff.core.camera import CameraPrior
 from standoff.core.errors import SourceError
 from standoff.core.types import Frame, ImageArray
 from standoff.stages.frames.folder import FolderReader
 from standoff.stages.frames.pictures import ArrayPicture
 from standoff.stages.frames.reader import TIME_ROUNDING_S, Reader, Shot
+from standoff.stages.frames.telemetry_choice import TelemetryChoice, choose_telemetry
 from standoff.stages.frames.video import VideoReader
 
 
@@ -77,6 +79,7 @@ class Source:
         reader: What reads it; closed with the source.
         selection: The part that is wanted.
         stream_id: Name of the stream.
+        telemetry: Where the drone's readings come from.
 
     Attributes:
         stream_id: Name of the stream.
@@ -88,8 +91,11 @@ class Source:
         SourceError: The part that is wanted holds no picture.
     """
 
-    def __init__(self, reader: Reader, selection: Selection, stream_id: str) -> None:
+    def __init__(
+        self, reader: Reader, selection: Selection, stream_id: str, telemetry: TelemetryChoice | None = None
+    ) -> None:
         self.stream_id = stream_id
+        self._telemetry = TelemetryChoice() if telemetry is None else telemetry
         self.size_px = reader.size_px
         self.frame_count = selection.expected_of(reader.total_frames, reader.rate_fps)
         self._reader = reader
@@ -126,12 +132,34 @@ class Source:
         started_at = self._reader.started_at
         for shot in self._shots:
             captured_at = None if started_at is None else started_at + timedelta(seconds=shot.time_s)
-            yield Frame(self.stream_id, shot.index, shot.time_s, shot.picture, captured_at)
+            telemetry = self._telemetry.at(shot)
+            yield Frame(self.stream_id, shot.index, shot.time_s, shot.picture, captured_at, telemetry)
+
+    @property
+    def camera_prior(self) -> CameraPrior:
+        """What the source itself knows of its camera: its log's focal length, EXIF data, the drone's model, nothing."""
+        return self._telemetry.camera_prior(self._reader)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the source says that does not fit together, or is not used, a clause each; known once it is open."""
+        return (*self._reader.warnings, *self._telemetry.warnings)
 
     @property
     def description(self) -> dict[str, Any]:
         """What it is and which part was wanted, for the record; counts grow while it is read."""
-        return {**self._reader.description, **self._selection._asdict(), "frames_expected": self.frame_count}
+        prior = self.camera_prior
+        return {
+            **self._reader.description,
+            **self._selection._asdict(),
+            "frames_expected": self.frame_count,
+            "telemetry": self._telemetry.description,
+            "camera": {
+                "origin": prior.origin,
+                "focal_px": round(float(prior.camera.matrix[0, 0]), 1),
+                "focal_sigma": round(prior.focal_sigma, 4),
+            },
+        }
 
     def close(self) -> None:
         """Let go of the file; frames already yielded stay valid."""
@@ -162,6 +190,7 @@ def open_source(
     stop_s: float | None = None,
     every: int = 1,
     fps: float | None = None,
+    telemetry: str | PathLike[str] | None = None,
 ) -> Source:
     """Open a video file or a folder of images.
 
@@ -176,9 +205,12 @@ def open_source(
         every: Yield each `every`-th picture, the first one included.
         fps: Pictures a second: needed for a folder, which has no clock. For a video it replaces its
             timestamps by index / fps: only for files whose timestamps are missing or wrong.
+        telemetry: A drone's log (SubRip); "none": no telemetry, not even that of the pictures. By default the log
+            beside a film (`film.srt`, or `telemetry.srt` in its folder), and the EXIF data of pictures.
 
     Raises:
-        SourceError: It cannot be read, or is empty in the part that is wanted.
+        SourceError: It cannot be read, or is empty in the part that is wanted, or the log that is asked for cannot
+            be used.
         SourceTruncated: Its end, and with it the table of its pictures, is missing.
     """
     path = Path(path)
@@ -192,7 +224,8 @@ def open_source(
         )
     reader: Reader = FolderReader(path, fps) if path.is_dir() else VideoReader(path, fps)
     try:
-        return Source(reader, selection, path.stem if stream_id is None else stream_id)
+        chosen = choose_telemetry(reader, path, telemetry)
+        return Source(reader, selection, path.stem if stream_id is None else stream_id, chosen)
     except SourceError:
         reader.close()
         raise

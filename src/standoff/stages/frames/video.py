@@ -11,9 +11,12 @@ from typing import Any
 
 import av
 
+from standoff.core.camera import CameraPrior
 from standoff.core.errors import SourceError, SourceTruncated
 from standoff.stages.frames.container import Header, not_a_video, open_video
+from standoff.stages.frames.fingerprint import fingerprint
 from standoff.stages.frames.pictures import AvPicture, Scaler
+from standoff.stages.frames.prior import drone_prior, find_drone
 from standoff.stages.frames.reader import TIME_ROUNDING_S, Shot, check_size
 
 _UNDECODABLE_IN_A_ROW = 100
@@ -50,12 +53,19 @@ class VideoReader:
         self._frames = self._decoded()
         try:
             self._first = self._first_frame()
-            self._rotation_deg = self._rotation()
+            self.rotation_deg = self._rotation()
         except SourceError:
             self._container.close()
             raise
-        picture = AvPicture(self._first, self._rotation_deg)
+        picture = AvPicture(self._first, self.rotation_deg)
         self.size_px = (picture.width_px, picture.height_px)
+        self.drone = find_drone(header.camera_names)
+        self.camera_prior = (
+            CameraPrior.unknown(*self.size_px)
+            if self.drone is None
+            else drone_prior(self.size_px, self.drone, film=True)
+        )
+        self.warnings: tuple[str, ...] = ()
 
     def _first_frame(self) -> av.VideoFrame:
         first = next(self._frames, None)
@@ -110,7 +120,7 @@ class VideoReader:
         first_index: int | None = None
         last_index, last_s, frame = -1, -math.inf, self._first
         for last_index, frame in self._numbered_from(start_s):
-            picture, label = AvPicture(frame, self._rotation_deg, self._scaler), f"frame {last_index}"
+            picture, label = AvPicture(frame, self.rotation_deg, self._scaler), f"frame {last_index}"
             check_size(picture, self.size_px, label)
             time_s = self._time_s(last_index, frame)
             if time_s <= last_s:
@@ -225,9 +235,10 @@ class VideoReader:
             "codec": self._header.codec,
             "pixel_format": self._first.format.name,
             "size_px": list(self.size_px),
-            "rotation_deg": self._rotation_deg,
+            "rotation_deg": self.rotation_deg,
             "fps": self.rate_fps,
             "duration_s": self._header.duration_s,
+            "fingerprint": fingerprint([self._path]),
             "frames_declared": self._header.declared_frames or None,
             "corrupt_frames": self.corrupt_frames,
             "clock": "presentation timestamps" if self._fps is None else "given frame rate",

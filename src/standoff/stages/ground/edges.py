@@ -158,16 +158,16 @@ def _shifts_to_top(magnitude: npt.NDArray[np.float32], points: FloatArray, direc
     shifts = np.zeros(len(points))
     for k in range(len(points)):
         x, y, step_x, step_y = points[k, 0], points[k, 1], direction[k, 0], direction[k, 1]
-        before, after = _between(magnitude, x - step_x, y - step_y), _between(magnitude, x + step_x, y + step_y)
-        bend = before + after - 2.0 * _between(magnitude, x, y)
+        before, after = interpolated(magnitude, x - step_x, y - step_y), interpolated(magnitude, x + step_x, y + step_y)
+        bend = before + after - 2.0 * interpolated(magnitude, x, y)
         if bend < 0:
             shifts[k] = min(max((before - after) / (2.0 * bend), -_MAX_SHIFT_PX), _MAX_SHIFT_PX)
     return shifts
 
 
 @compiled
-def _between(values: npt.NDArray[np.float32], x: float, y: float) -> float:
-    """Interpolate linearly; the point lies on the picture."""
+def interpolated(values: npt.NDArray[np.float32], x: float, y: float) -> float:
+    """Return a picture's value between its pixels; the point lies on the picture."""
     column, row = min(int(x), values.shape[1] - 2), min(int(y), values.shape[0] - 2)
     right, down = x - column, y - row
     above = values[row, column] * (1.0 - right) + values[row, column + 1] * right

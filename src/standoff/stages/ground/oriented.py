@@ -42,6 +42,8 @@ _MIXED_POLARITY = 0.8
 _RIVAL_SCORE, _RIVAL_APART_PX, _LOOKED_AT = 0.95, 4.0, 12
 """A different quadrilateral with 95 % of the best one's score makes the answer a guess: none is given."""
 
+_ALIKE_PX = 2.0
+
 _REFIT_PX, _REFIT_TRIM_PX, _REFIT_ROUNDS, _TUKEY_ROUNDS = 2.0, 3.0, 2, 4
 _MIN_SCATTER_PX = 0.1
 
@@ -113,6 +115,13 @@ def _best_four(
     lines: FloatArray, covered_before: FloatArray, size: FloatArray, believable: Callable[[FloatArray], bool]
 ) -> IntArray | NoGroundMap:
     """Return the indices of the four lines, in walking order, whose quadrilateral the edges support best."""
+    return _first_believable(*_scored_walks(lines, covered_before, size), believable)
+
+
+def _scored_walks(
+    lines: FloatArray, covered_before: FloatArray, size: FloatArray
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Return all quadrilaterals with some support: (Q, 4) lines, (Q, 4, 2) corners, (Q,) scores."""
     meet = crossings(lines)
     reach = size / 2.0 + _OUTSIDE * size.max()
     meet[(np.abs(meet) > reach).any(axis=-1)] = np.nan
@@ -122,7 +131,31 @@ def _best_four(
     hopeful = score > 0
     walks, corners, score = walks[hopeful], corners[hopeful], score[hopeful]
     fill = np.prod(np.ptp(corners, axis=1) / size, axis=1)
-    return _first_believable(walks, corners, score * np.sqrt(np.minimum(fill, 1.0)), believable)
+    return walks, corners, score * np.sqrt(np.minimum(fill, 1.0))
+
+
+def likely_quadrilaterals(edges: Edges, box_xyxy_px: FloatArray, count: int) -> FloatArray:
+    """Return (Q, 4, 2) corners of up to `count` quadrilaterals in a box, the best supported first.
+
+    Args:
+        edges: Of the box, located between pixels.
+        box_xyxy_px: (4,) in the same pixels as the edges.
+        count: At most so many, no two of them alike.
+    """
+    centre, size = (box_xyxy_px[:2] + box_xyxy_px[2:]) / 2.0, box_xyxy_px[2:] - box_xyxy_px[:2]
+    points, direction = edges.points_px - centre, edges.direction
+    lines = candidate_lines(points, direction, _CANDIDATES)
+    if len(lines) < 4:
+        return np.zeros((0, 4, 2))
+    _, corners, score = _scored_walks(lines, _covered_before(lines, points, direction, size), size)
+    chosen: list[FloatArray] = []
+    for k in np.argsort(-score, kind="stable"):
+        apart = [np.linalg.norm(one[ORDERS] - corners[k], axis=-1).max(axis=-1).min() for one in chosen]
+        if not apart or min(apart) > _ALIKE_PX:
+            chosen.append(corners[k])
+        if len(chosen) == count:
+            break
+    return np.array(chosen).reshape(-1, 4, 2) + centre
 
 
 def _first_believable(

@@ -90,7 +90,7 @@ class OutlineFinder:
         edges = between_pixels(canny(gradients, *noise_thresholds(gradients)), gradients).undistorted(self.camera)
         if len(edges) < _MIN_EDGES:
             return NoGroundMap(TOO_FEW_EDGES)
-        lines = oriented_lines(edges, _undistorted_box(box_xyxy_px, self.camera), self._believable)
+        lines = oriented_lines(edges, undistorted_box(box_xyxy_px, self.camera), self._believable)
         return lines if isinstance(lines, NoGroundMap) else self._joined(lines, edges, None)
 
     def _joined(self, lines: FloatArray, edges: Edges, sigma_px: float | None) -> Quadrilateral | NoGroundMap:
@@ -98,7 +98,7 @@ class OutlineFinder:
         return NoGroundMap(NO_QUADRILATERAL) if made is None else made
 
 
-def _undistorted_box(box_xyxy_px: FloatArray, camera: Camera | None) -> FloatArray:
+def undistorted_box(box_xyxy_px: FloatArray, camera: Camera | None) -> FloatArray:
     """Return the box around the undistorted outline of a picture box."""
     if camera is None:
         return box_xyxy_px

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 from annotated_types import Ge, Gt, Interval
 from typing_extensions import Doc
 
-ReferenceMethod = Literal["paper", "paper+tls", "oriented"]
+ReferenceMethod = Literal["paper", "paper+tls", "oriented", "refined", "fused"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,10 +16,11 @@ class ReferenceParams:
     method: Annotated[
         ReferenceMethod,
         Doc(
-            "paper: the paper's steps exactly. paper+tls: its four lines refitted by total least squares. "
-            "oriented: edge directions, candidate lines and sub-pixel refit."
+            "fused: the reference as a solid, seen by a camera that is followed from frame to frame. refined: the same "
+            "for each frame alone. paper: the paper's steps exactly, each frame alone. paper+tls: its four lines "
+            "refitted by total least squares. oriented: edge directions, candidate lines and sub-pixel refit."
         ),
-    ] = "oriented"
+    ] = "fused"
     high_threshold: Annotated[
         float, Interval(gt=0, le=1), Doc("Canny's upper threshold, a share of the box's largest gradient (paper: 0.6).")
     ] = 0.6
@@ -67,6 +68,15 @@ class ReferenceParams:
     memory_s: Annotated[
         float, Gt(0), Doc("For so many seconds the last known outline tells which corner is which, and where to look.")
     ] = 2.0
+
+    size_sigma: Annotated[
+        float, Interval(ge=0, le=0.2), Doc("Standard error of the reference's stated lengths, as a share of them.")
+    ] = 0.005
+    max_scale_sigma: Annotated[
+        float,
+        Interval(gt=0, le=1),
+        Doc("A map whose scale is less sure than this share (one standard error) is no map."),
+    ] = 0.1
 
     def __post_init__(self) -> None:
         if self.low_threshold > self.high_threshold:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -10,27 +9,21 @@ import numpy as np
 
 from standoff.core import homography
 from standoff.core.camera import Camera
-from standoff.core.classes import Role, class_ids
 from standoff.core.errors import GroundError
 from standoff.core.homography import FloatArray
-from standoff.core.types import Detections, Frame, GroundMap, ImageArray, NoGroundMap
+from standoff.core.types import CameraMotion, Detections, Frame, GroundMap, ImageArray, NoCameraMotion, NoGroundMap
 from standoff.stages.ground.correspondence import camera_misfit_px, turn_from_before
 from standoff.stages.ground.follow import BoxFollower, moved_box
 from standoff.stages.ground.outline import OutlineFinder
 from standoff.stages.ground.params import ReferenceParams
 from standoff.stages.ground.quadrilateral import ORDERS, Quadrilateral
 from standoff.stages.ground.shape import ReferenceShape
+from standoff.stages.ground.where import NOT_SEEN, GivenPlace, detected_box
 
-NOT_SEEN = "no detection of the reference"
-NOT_YET = "the reference's box is given for a later frame"
 LOST = "the reference is lost"
 IMPLAUSIBLE = "no camera could see the reference like this"
 AMBIGUOUS = "which corner is which cannot be told"
 
-_LATE_S = 0.5
-"""A box given for a time that the source starts after by more than this is a mistake."""
-
-_TIME_SLACK_S = 1e-3
 _FOLLOWED_MARGIN, _FOLLOWED_MARGIN_PX = 0.06, 4.0
 _UNMOVED = 0.2
 """An outline found without following the box may have moved by this share of its shortest side."""
@@ -50,14 +43,9 @@ class ReferenceGround:
     Args:
         shape: The reference's true shape; it defines the site frame.
         params: Settings.
-        box_xyxy_px: (4,) left, top, right, bottom of the reference in one frame; None: the detector finds it.
-        box_time_s: Presentation timestamp of that frame; None: the first frame.
-        first_corner_px: (2,) about where corner 0 of the shape is in that frame, or, without a box, where it is when
-            the detector first sees the reference; None: no hint.
+        place: What the operator said of where it is.
         camera: Calibrated camera; its lens distortion is removed from edge points before lines are fitted.
 
-    Raises:
-        GroundError: The box, its time or the hint make no sense.
     """
 
     def __init__(
@@ -65,16 +53,12 @@ class ReferenceGround:
         shape: ReferenceShape,
         params: ReferenceParams | None = None,
         *,
-        box_xyxy_px: Sequence[float] | FloatArray | None = None,
-        box_time_s: float | None = None,
-        first_corner_px: Sequence[float] | FloatArray | None = None,
+        place: GivenPlace | None = None,
         camera: Camera | None = None,
     ) -> None:
         self._shape = shape
         self._params = params if params is not None else ReferenceParams()
-        self._given_box = None if box_xyxy_px is None else _checked_box(box_xyxy_px)
-        self._given_time_s = box_time_s
-        self._given_corner = None if first_corner_px is None else _checked_corner(first_corner_px, self._given_box)
+        self._given = place if place is not None else GivenPlace()
         self._given_camera = camera
         self._camera = camera
         self._size_px: tuple[int, int] | None = None
@@ -82,7 +66,7 @@ class ReferenceGround:
         self._follower = BoxFollower()
         self._box: FloatArray | None = None
         self._corners: FloatArray | None = None
-        self._hint = self._given_corner
+        self._hint = self._given.first_corner_px
         self._known_s = -np.inf
         self._outlined = False
 
@@ -93,18 +77,19 @@ class ReferenceGround:
             "kind": "reference",
             "corners_m": self._shape.corners_m.tolist(),
             "params": asdict(self._params),
-            "box_xyxy_px": None if self._given_box is None else self._given_box.tolist(),
-            "box_time_s": self._given_time_s,
-            "first_corner_px": None if self._given_corner is None else self._given_corner.tolist(),
+            **self._given.describe(),
             "lens_distortion_removed": self._given_camera is not None,
         }
 
-    def update(self, frame: Frame, detections: Detections) -> GroundMap | NoGroundMap:
+    def update(
+        self, frame: Frame, detections: Detections, motion: CameraMotion | NoCameraMotion
+    ) -> GroundMap | NoGroundMap:
         """Map one frame.
 
         Args:
             frame: Frames in the order of their time.
             detections: Of this frame; empty where the detector rested.
+            motion: Plays no part.
 
         Returns:
             The map from undistorted pixels to metres, observed in this frame, or why there is none.
@@ -158,21 +143,18 @@ class ReferenceGround:
     def _finder_for(self, size_px: tuple[int, int]) -> OutlineFinder:
         if self._finder is None or self._size_px != size_px:
             width, height = size_px
-            if self._given_box is not None:
-                left, top, right, bottom = self._given_box
-                if left >= width or top >= height or right <= 0 or bottom <= 0:
-                    raise _box_error(f"a box in the picture of {width}x{height}", f"{self._given_box.tolist()}")
+            self._given.check_size(size_px)
             if self._given_camera is not None:
-                self._camera = _camera_for(self._given_camera, width, height)
+                self._camera = camera_for(self._given_camera, width, height)
             self._size_px = size_px
             self._finder = OutlineFinder(self._params, self._camera, self._could_be_reference)
         return self._finder
 
     def _where(self, time_s: float, gray: ImageArray, detections: Detections) -> FloatArray | NoGroundMap:
-        detected = self._detected_box(time_s, detections) if self._given_box is None else None
+        detected = self._detected_box(time_s, detections) if self._given.box_xyxy_px is None else None
         if self._box is None:
-            if self._given_box is not None:
-                return self._given_box_at(time_s)
+            if self._given.box_xyxy_px is not None:
+                return self._given.box_at(time_s)
             return detected if detected is not None else NoGroundMap(NOT_SEEN)
         if detected is not None and self._outlined:
             return detected
@@ -191,30 +173,10 @@ class ReferenceGround:
         self._known_s = time_s
         return moved_box(motion, box)
 
-    def _given_box_at(self, time_s: float) -> FloatArray | NoGroundMap:
-        assert self._given_box is not None
-        if self._given_time_s is None:
-            return self._given_box
-        if time_s < self._given_time_s - _TIME_SLACK_S:
-            return NoGroundMap(NOT_YET)
-        if time_s > self._given_time_s + _LATE_S:
-            raise _box_error(
-                f"a frame at {self._given_time_s:g} s, for which the reference's box is given",
-                f"the first frame after it at {time_s:g} s",
-            )
-        return self._given_box
-
     def _detected_box(self, time_s: float, detections: Detections) -> FloatArray | None:
-        """Return the surest detection; while the last box is fresh, of those near it: there may be two references."""
-        seen = np.isin(detections.class_id, class_ids(Role.REFERENCE)) & (detections.score >= self._params.min_score)
-        if self._box is not None and time_s - self._known_s <= self._params.memory_s:
-            centre, diagonal = _centre_and_diagonal(self._box)
-            centres = (detections.xyxy_px[:, :2] + detections.xyxy_px[:, 2:]) / 2.0
-            seen &= np.linalg.norm(centres - centre, axis=1) <= diagonal
-        if not seen.any():
-            return None
-        box: FloatArray = detections.xyxy_px[int(np.where(seen, detections.score, -1.0).argmax())]
-        return box
+        """Return the surest detection; while the last box is fresh, of those near it."""
+        fresh = self._box is not None and time_s - self._known_s <= self._params.memory_s
+        return detected_box(detections, self._params.min_score, self._box if fresh else None)
 
     def _misfit(self, corners_px: FloatArray) -> tuple[FloatArray, float]:
         """Return the misfit of each cyclic order and the largest that is believed, both in px."""
@@ -303,32 +265,12 @@ def rectified_scale_m_per_px(corners_px: FloatArray, shape: ReferenceShape) -> f
     return float(shape.sides_m.sum()) / perimeter_px
 
 
-def _centre_and_diagonal(box_xyxy_px: FloatArray) -> tuple[FloatArray, float]:
-    return (box_xyxy_px[:2] + box_xyxy_px[2:]) / 2.0, float(np.linalg.norm(box_xyxy_px[2:] - box_xyxy_px[:2]))
+def camera_for(camera: Camera, width: int, height: int) -> Camera:
+    """Return the camera for pictures of a size.
 
-
-def _checked_box(box_xyxy_px: Sequence[float] | FloatArray) -> FloatArray:
-    expected = "a reference box of left, top, right, bottom in px"
-    box = np.array(box_xyxy_px, dtype=np.float64)
-    if box.shape != (4,) or not np.isfinite(box).all():
-        raise _box_error(expected, f"{box.tolist()}")
-    if box[2] <= box[0] or box[3] <= box[1]:
-        raise _box_error(expected, f"{box.tolist()}, whose right or bottom does not exceed its left or top")
-    return box
-
-
-def _checked_corner(first_corner_px: Sequence[float] | FloatArray, box: FloatArray | None) -> FloatArray:
-    corner = np.array(first_corner_px, dtype=np.float64)
-    if corner.shape != (2,) or not np.isfinite(corner).all():
-        raise _box_error("first_corner_px x, y", f"{corner.tolist()}")
-    if box is not None:
-        slack = 0.2 * (box[2:] - box[:2])
-        if not ((corner >= box[:2] - slack) & (corner <= box[2:] + slack)).all():
-            raise _box_error(f"first_corner_px x, y in the reference's box {box.tolist()}", f"{corner.tolist()}")
-    return corner
-
-
-def _camera_for(camera: Camera, width: int, height: int) -> Camera:
+    Raises:
+        GroundError: It is calibrated for pictures of another shape.
+    """
     try:
         return camera.scaled_to(width, height)
     except ValueError as error:
@@ -337,7 +279,3 @@ def _camera_for(camera: Camera, width: int, height: int) -> Camera:
             found=f"one for {camera.width_px}x{camera.height_px}",
             fix="calibrate with pictures from the same camera mode as the video",
         ) from error
-
-
-def _box_error(expected: str, found: str) -> GroundError:
-    return GroundError(expected=expected, found=found, fix="read the box off one frame and give that frame's time")

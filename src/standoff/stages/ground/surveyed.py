@@ -13,7 +13,7 @@ from standoff.core import homography
 from standoff.core.camera import Camera
 from standoff.core.errors import GroundError
 from standoff.core.homography import FloatArray
-from standoff.core.types import Detections, Frame, GroundMap, NoGroundMap
+from standoff.core.types import CameraMotion, Detections, Frame, GroundMap, NoCameraMotion, NoGroundMap
 from standoff.stages.ground.survey_fit import SurveyFit, fit_survey
 
 # Two normal coordinates reach it once in 50,000 points.
@@ -100,8 +100,10 @@ class SurveyedGround:
                 fix="survey a frame of this source",
             )
 
-    def update(self, frame: Frame, detections: Detections) -> GroundMap | NoGroundMap:
-        """Return the map for a frame; the detections play no part.
+    def update(
+        self, frame: Frame, detections: Detections, motion: CameraMotion | NoCameraMotion
+    ) -> GroundMap | NoGroundMap:
+        """Return the map for a frame; detections and motion play no part.
 
         Returns:
             The same object as long as the frame's size is the same.

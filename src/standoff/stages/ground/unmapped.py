@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from standoff.core.types import Detections, Frame, NoGroundMap
+from standoff.core.types import CameraMotion, Detections, Frame, NoCameraMotion, NoGroundMap
 
 
 class Unmapped:
@@ -11,6 +11,6 @@ class Unmapped:
     def __init__(self) -> None:
         self.description = {"method": "none"}
 
-    def update(self, frame: Frame, detections: Detections) -> NoGroundMap:
-        """Return the reason; frame and detections play no part."""
+    def update(self, frame: Frame, detections: Detections, motion: CameraMotion | NoCameraMotion) -> NoGroundMap:
+        """Return the reason; frame, detections and motion play no part."""
         return NoGroundMap("no ground is configured")

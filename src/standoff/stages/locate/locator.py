@@ -10,7 +10,7 @@ from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import GroundMap, GroundPositions, NoGroundMap, TextArray, Tracks
 from standoff.stages.locate.params import LocateParams
 from standoff.stages.locate.region import inside
-from standoff.stages.locate.uncertainty import factor, horizon_margin, own_covariance
+from standoff.stages.locate.uncertainty import factor, horizon_margin, map_jacobian, own_covariance
 from standoff.stages.locate.velocity import VelocityEstimator
 
 CUT_OFF = "cut off by the picture's edge"
@@ -56,7 +56,7 @@ class Locator:
         if isinstance(ground, NoGroundMap):
             points_px = np.full((len(tracks), 2), np.nan)
             xy_m = points_px.copy()
-            covariance_m2, map_factor_m = np.full((len(tracks), 2, 2), np.nan), np.full((len(tracks), 2, 9), np.nan)
+            covariance_m2, map_factor_m = np.full((len(tracks), 2, 2), np.nan), np.full((len(tracks), 2, 10), np.nan)
             reason = np.full(len(tracks), f"no ground map: {ground.reason}", dtype=object)
         else:
             points_px = ground.undistorted(self._anchors(tracks))
@@ -65,7 +65,7 @@ class Locator:
             reason = self._reasons(tracks, ground, points_px, horizon_margin(ground, root, points_px, variance_px2))
             points_px = np.where((reason == "")[:, None], points_px, np.nan)
             xy_m, _ = homography.apply(ground.image_to_ground, points_px)
-            map_factor_m = homography.parameter_jacobian(ground.image_to_ground, points_px) @ root
+            map_factor_m = map_jacobian(ground, points_px) @ root
             covariance_m2 = own_covariance(ground, points_px, variance_px2)
             covariance_m2 += map_factor_m @ map_factor_m.transpose(0, 2, 1)
         valid = np.isfinite(points_px).all(axis=1)

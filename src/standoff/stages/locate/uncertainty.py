@@ -57,6 +57,28 @@ def undistortion_jacobian(camera: Camera, undistorted_px: FloatArray) -> FloatAr
     return back
 
 
+def map_jacobian(ground: GroundMap, undistorted_px: FloatArray) -> FloatArray:
+    """Return how ground points move with the map: by its nine entries, then by the lens's k1.
+
+    Args:
+        ground: The map.
+        undistorted_px: (N, 2) the points without lens distortion, whose places in the picture stay.
+
+    Returns:
+        (N, 2, 10); NaN where the point is.
+    """
+    by_entries = homography.parameter_jacobian(ground.image_to_ground, undistorted_px)
+    if ground.camera is None:
+        return np.concatenate([by_entries, np.zeros((len(undistorted_px), 2, 1))], axis=2)
+    focal = np.array([ground.camera.matrix[0, 0], ground.camera.matrix[1, 1]])
+    normalised = (undistorted_px - ground.camera.matrix[:2, 2]) / focal
+    # More k1 moves the picture of a direction outwards, so a fixed place in the picture is of one further in.
+    seen_by_k1 = normalised * (normalised**2).sum(axis=1, keepdims=True) * focal
+    by_point = homography.point_jacobian(ground.image_to_ground, undistorted_px)
+    by_k1 = -by_point @ undistortion_jacobian(ground.camera, undistorted_px) @ seen_by_k1[:, :, None]
+    return np.concatenate([by_entries, by_k1], axis=2)
+
+
 def own_covariance(ground: GroundMap, undistorted_px: FloatArray, variance_px2: FloatArray) -> FloatArray:
     """Carry the error of each picture point to the ground, lens and perspective included.
 
@@ -84,7 +106,7 @@ def horizon_margin(
 
     Args:
         ground: The map.
-        root: (9, 9) factor of its covariance.
+        root: (10, 10) factor of its covariance.
         undistorted_px: (N, 2).
         variance_px2: (N, 2); the lens's part in it is left out.
 
@@ -94,7 +116,7 @@ def horizon_margin(
     last_row = ground.image_to_ground[2]
     homogeneous = np.column_stack([undistorted_px, np.ones(len(undistorted_px))])
     denominator = homogeneous @ last_row
-    variance = variance_px2 @ last_row[:2] ** 2 + ((homogeneous @ root[6:]) ** 2).sum(axis=1)
+    variance = variance_px2 @ last_row[:2] ** 2 + ((homogeneous @ root[6:9]) ** 2).sum(axis=1)
     exact = variance == 0.0
     margin: FloatArray = denominator / np.sqrt(np.where(exact, 1.0, variance))
     margin[exact & (denominator > 0)] = np.inf

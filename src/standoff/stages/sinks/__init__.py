@@ -5,10 +5,11 @@ from standoff.stages.sinks.hazards import HazardSink
 from standoff.stages.sinks.params import DrawParams, ReportParams, TableParams, VideoParams
 from standoff.stages.sinks.record import RecordSink
 from standoff.stages.sinks.report import ReportSink
-from standoff.stages.sinks.tables import FRAMES, PROXIMITY, TRACKS, Table, TableSink
+from standoff.stages.sinks.tables import DETECTIONS, FRAMES, PROXIMITY, TRACKS, Table, TableSink, detections_table
 from standoff.stages.sinks.video import Composer, VideoSink
 
 __all__ = [
+    "DETECTIONS",
     "FRAMES",
     "OUTPUT_FILES",
     "PROXIMITY",
@@ -24,5 +25,6 @@ __all__ = [
     "TableSink",
     "VideoParams",
     "VideoSink",
+    "detections_table",
     "prepare_output",
 ]

@@ -13,6 +13,7 @@ OUTPUT_FILES: tuple[str, ...] = (
     "tracks.parquet",
     "proximity.parquet",
     "frames.parquet",
+    "detections.parquet",
     "hazards.jsonl",
     "annotated.mp4",
     "report.html",

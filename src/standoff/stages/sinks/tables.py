@@ -1,4 +1,4 @@
-"""`tracks.parquet`, `proximity.parquet`, `frames.parquet`: every number of a run, for other people's tools.
+"""`tracks`, `proximity`, `frames` and `detections.parquet`: every number of a run, for other people's tools.
 
 A number that was not measured is null, never NaN and never a stand-in. Each column carries its unit and
 description in its Arrow field metadata. `time_to_contact_s` alone can be infinite: not approaching.
@@ -6,7 +6,7 @@ description in its Arrow field metadata. `time_to_contact_s` alone can be infini
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,9 +15,11 @@ import numpy as np
 import pyarrow as pa
 
 from standoff import __version__
+from standoff.clips import COLUMNS, metadata_of
 from standoff.core.classes import CLASSES
-from standoff.core.homography import BoolArray
+from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import FrameResult, GroundMap, IntArray, NoGroundMap, Outcome, TextArray
+from standoff.stages.sinks.json_text import plain
 from standoff.stages.sinks.params import TableParams
 from standoff.stages.sinks.parquet_parts import Columns, ParquetParts
 
@@ -98,7 +100,7 @@ class TableSink:
 
     Args:
         path: Final file, `tracks.parquet` for instance; while the run goes on, see `tracks.parts/`.
-        table: `TRACKS`, `PROXIMITY` or `FRAMES`.
+        table: `TRACKS`, `PROXIMITY`, `FRAMES`, or `detections_table(...)`.
         params: How often parts are written.
     """
 
@@ -135,7 +137,7 @@ def _track_rows(result: FrameResult) -> Columns:
         "track_id": tracks.track_id,
         "class": _NAMES[tracks.class_id],
         "score": tracks.score,
-        **{f"{edge}_px": tracks.xyxy_px[:, i] for i, edge in enumerate(("x1", "y1", "x2", "y2"))},
+        **_box_columns(tracks.xyxy_px),
         "observed": tracks.observed,
         "age_s": tracks.age_s,
         "x_m": positions.xy_m[:, 0],
@@ -149,6 +151,10 @@ def _track_rows(result: FrameResult) -> Columns:
         "valid": positions.valid,
         "reason": positions.reason,
     }
+
+
+def _box_columns(xyxy_px: FloatArray) -> dict[str, FloatArray]:
+    return {f"{edge}_px": xyxy_px[:, i] for i, edge in enumerate(("x1", "y1", "x2", "y2"))}
 
 
 def _classes_of(track_id: IntArray, result: FrameResult) -> TextArray:
@@ -198,6 +204,37 @@ def _frame_rows(result: FrameResult) -> Columns:
     return {**_frame_columns(result, 1), **{name: [value] for name, value in values.items()}}
 
 
+def _detection_rows(result: FrameResult) -> Columns:
+    """Return a row for each detection, or one without a box: every frame that was read must be in the table."""
+    found, rows = result.detections, max(len(result.detections), 1)
+    columns = {**_frame_columns(result, rows), "detected": np.full(rows, result.detected)}
+    if len(found) == 0:
+        nothing: TextArray = np.array([None], dtype=object)
+        names = ("score", "class", "class_id")
+        return {**columns, **_box_columns(np.full((1, 4), np.nan)), **dict.fromkeys(names, nothing)}
+    return {
+        **columns,
+        **_box_columns(found.xyxy_px),
+        "score": found.score,
+        "class": _NAMES[found.class_id],
+        "class_id": found.class_id,
+    }
+
+
+def detections_table(source: Mapping[str, Any], detector: Mapping[str, Any] | None) -> Table:
+    """Return `DETECTIONS` with metadata that say whose they are, without which they cannot be replayed.
+
+    Args:
+        source: The source's description, `size_px` among it.
+        detector: The detector's description, if it has one.
+    """
+    width_px, height_px = source["size_px"]
+    about = metadata_of((width_px, height_px), plain(source), plain(detector or {}))
+    schema = DETECTIONS.schema
+    return Table(schema.with_metadata({**(schema.metadata or {}), **about}), DETECTIONS.rows)
+
+
 TRACKS = Table(_schema(_TRACK_COLUMNS), _track_rows)
 PROXIMITY = Table(_schema(_PROXIMITY_COLUMNS), _proximity_rows)
 FRAMES = Table(_schema(_FRAMES_COLUMNS), _frame_rows)
+DETECTIONS = Table(_schema(COLUMNS), _detection_rows)

@@ -9,14 +9,16 @@ import numpy as np
 from standoff.core.boxes import overlaps
 from standoff.core.classes import CLASSES, Role
 from standoff.core.homography import BoolArray, FloatArray
-from standoff.core.types import Detections, IntArray, Tracks
-from standoff.stages.track import motion
+from standoff.core.picture_step import picture_step
+from standoff.core.types import CameraMotion, Detections, IntArray, NoCameraMotion, Tracks
+from standoff.stages.track import motion as box_motion
 from standoff.stages.track.association import assign, widen
+from standoff.stages.track.carry import carry
 from standoff.stages.track.params import TrackParams
 
 _ROW = np.dtype(
     [
-        *motion.MOTION_FIELDS,
+        *box_motion.MOTION_FIELDS,
         ("track_id", np.int64),
         ("score", np.float64),
         ("class_votes", np.float64, (len(CLASSES),)),
@@ -49,6 +51,9 @@ class Tracker:
     Persons continue as persons, machines as machines; among machines the class may flicker, and the
     track's class is the one with the largest sum of scores so far. Reference objects are not tracked.
 
+    Where the motion of the camera is known, boxes are predicted over the ground and carried along with its picture, so
+    that a turning drone loses nobody; where it is not, the picture is taken to stand still.
+
     Times are presentation timestamps in seconds; the steps between them may vary, and may be zero.
 
     Args:
@@ -60,9 +65,10 @@ class Tracker:
 
     >>> tracker = Tracker()
     >>> box = np.array([[10.0, 10.0, 20.0, 40.0]])
-    >>> tracker.update(0.0, Detections(box, np.array([0.9]), np.array([0]))).track_id
+    >>> still = NoCameraMotion("not estimated")
+    >>> tracker.update(0.0, Detections(box, np.array([0.9]), np.array([0])), still).track_id
     array([1])
-    >>> tracker.coast(0.1).observed
+    >>> tracker.coast(0.1, still).observed
     array([False])
     """
 
@@ -78,14 +84,16 @@ class Tracker:
         """
         self._rows = np.zeros(0, _ROW)
         self._time_s = -math.inf
+        self._motion: CameraMotion | NoCameraMotion = NoCameraMotion("no frame before")
         self._looked_s = -math.inf
 
-    def update(self, time_s: float, detections: Detections) -> Tracks:
+    def update(self, time_s: float, detections: Detections, motion: CameraMotion | NoCameraMotion) -> Tracks:
         """Take in what the detector saw.
 
         Args:
             time_s: Presentation timestamp, not before the previous one.
             detections: May be empty: the detector looked and saw nothing.
+            motion: How the picture of the ground moved, of this frame.
 
         Returns:
             The confirmed tracks in the order of their ids, coasting ones included. Boxes are filtered,
@@ -94,7 +102,7 @@ class Tracker:
         Raises:
             ValueError: The time is not finite or went backwards.
         """
-        self._advance(time_s)
+        self._advance(time_s, motion)
         detections = self._relevant(detections)
         unclaimed = self._associate(detections)
         self._end_lost()
@@ -102,13 +110,14 @@ class Tracker:
         self._looked_s = time_s
         return self._report()
 
-    def coast(self, time_s: float) -> Tracks:
+    def coast(self, time_s: float, motion: CameraMotion | NoCameraMotion) -> Tracks:
         """Predict all tracks to a frame on which the detector rested.
 
         Nobody looked, so no track ends and none is dropped from the report: a rest is not a miss.
 
         Args:
             time_s: Presentation timestamp, not before the previous one.
+            motion: How the picture of the ground moved, of this frame.
 
         Returns:
             The confirmed tracks in the order of their ids, none of them observed.
@@ -116,17 +125,20 @@ class Tracker:
         Raises:
             ValueError: The time is not finite or went backwards.
         """
-        self._advance(time_s)
+        self._advance(time_s, motion)
         return self._report(rested=True)
 
-    def _advance(self, time_s: float) -> None:
+    def _advance(self, time_s: float, motion: CameraMotion | NoCameraMotion) -> None:
         if not math.isfinite(time_s) or time_s < self._time_s:
             raise ValueError(
                 f"expected a time not before {self._time_s} s, found {time_s} s; call reset() when a new stream begins"
             )
         if len(self._rows):
-            motion.predict(self._rows, time_s - self._time_s, self._params)
-        self._time_s = time_s
+            box_motion.predict(self._rows, time_s - self._time_s, self._params)
+            step = picture_step(self._motion, self._time_s, motion)
+            if step is not None and isinstance(motion, CameraMotion):
+                carry(self._rows, step, motion.camera)
+        self._time_s, self._motion = time_s, motion
 
     def _relevant(self, detections: Detections) -> Detections:
         """Drop reference objects, hopeless scores, and a machine's second box under another class."""
@@ -169,7 +181,7 @@ class Tracker:
     def _similarity(self, detections: Detections) -> FloatArray:
         """Return (M, N) overlap of tracks with detections; less for another class, 0 for another role."""
         margin = self._params.margin
-        predicted_px = motion.to_edges(self._rows["box"])
+        predicted_px = box_motion.to_edges(self._rows["box"])
         class_id = self._class_id(self._rows)[:, None]
         agreement = np.where(class_id == detections.class_id, 1.0, _OTHER_CLASS)
         agreement *= _ROLE[class_id] == _ROLE[detections.class_id]
@@ -178,7 +190,7 @@ class Tracker:
     def _continue(self, which: IntArray, detections: Detections, by: IntArray) -> None:
         """Take detections `by` (K,) into tracks `which` (K,)."""
         rows, score = self._rows, detections.score[by]
-        motion.correct(rows, which, motion.to_centre(detections.xyxy_px[by]), self._params)
+        box_motion.correct(rows, which, box_motion.to_centre(detections.xyxy_px[by]), self._params)
         rows["score"][which] = score
         rows["class_votes"][which, detections.class_id[by]] += score
         rows["hits"][which] += 1
@@ -198,7 +210,7 @@ class Tracker:
         if not count:
             return
         rows = np.zeros(count, _ROW)
-        motion.start(rows, motion.to_centre(detections.xyxy_px), self._params)
+        box_motion.start(rows, box_motion.to_centre(detections.xyxy_px), self._params)
         rows["track_id"] = np.arange(self._next_id, self._next_id + count)
         rows["score"] = detections.score
         rows["class_votes"][np.arange(count), detections.class_id] = detections.score
@@ -209,7 +221,7 @@ class Tracker:
         self._rows = np.concatenate([self._rows, rows])
 
     @staticmethod
-    def _class_id(rows: motion.MotionArray) -> IntArray:
+    def _class_id(rows: box_motion.MotionArray) -> IntArray:
         class_id: IntArray = rows["class_votes"].argmax(axis=1)
         return class_id
 
@@ -218,7 +230,7 @@ class Tracker:
         rows = self._rows[self._rows["confirmed"] & (overdue_s <= self._params.max_coast_s + _TIME_ROUNDING_S)]
         return Tracks(
             track_id=rows["track_id"],
-            xyxy_px=motion.to_edges(rows["box"]),
+            xyxy_px=box_motion.to_edges(rows["box"]),
             score=rows["score"],
             class_id=self._class_id(rows),
             observed=(rows["seen_s"] == self._time_s) & (not rested),

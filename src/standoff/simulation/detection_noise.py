@@ -1,0 +1,180 @@
+"""What a detector would make of a frame, drawn from its truth: misses, edges that are off, scores, false alarms.
+
+The parameters are those of the detector that comes with standoff, fitted by `examples/detection_noise/fit.py`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+import pyarrow as pa
+from scipy.special import expit, ndtr
+
+from standoff.core.classes import CLASSES
+from standoff.core.homography import FloatArray
+from standoff.simulation.truth import Row
+
+DETECTIONS_SCHEMA = pa.schema(
+    [("frame", pa.int32()), ("time_s", pa.float64())]
+    + [(name, pa.float64()) for name in ("x1_px", "y1_px", "x2_px", "y2_px", "score")]
+    + [("class", pa.string()), ("class_id", pa.int32())]
+)
+"""One row per detection, frame by frame, the surest first."""
+
+USUAL_SIZE_PX = 32.0
+"""Square root of a box's area at which `found` and `score` begin to count."""
+LEAST_SCORE = 0.1
+"""Of `standoff.stages.detect.DetectParams`: what is less sure is not passed on."""
+_SURE = 0.999
+_LATENT = 6  # four edges, presence, score
+_SMALLEST_PX = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class ClassNoise:
+    """How the detector errs about one group of classes.
+
+    Size is log2 of the square root of the visible box's area over `USUAL_SIZE_PX`; hidden is 1 less the visible share.
+
+    Attributes:
+        found: Log odds of being found: at the usual size in full view, change with size, change with hidden.
+        edge_bias: Mean error of left, top, right and bottom, as a share of the box's width or height; > 0 outwards.
+        edge_share: Standard deviation of an edge's error, as a share of the width or height.
+        edge_px: Standard deviation of a further error; px.
+        score: Log odds of the score of what is found: as of `found`.
+        score_sigma: Standard deviation around them.
+        false_per_frame: Mean number of detections of nothing, of each class of the group.
+        false_size: Mean and standard deviation of their size.
+        false_score: Mean and standard deviation of the log odds of their score.
+    """
+
+    found: tuple[float, float, float]
+    edge_bias: tuple[float, float, float, float]
+    edge_share: float
+    edge_px: float
+    score: tuple[float, float, float]
+    score_sigma: float
+    false_per_frame: float
+    false_size: tuple[float, float]
+    false_score: tuple[float, float]
+
+
+GROUPS: Mapping[str, str] = MappingProxyType(
+    {
+        "worker": "worker", "excavator": "machine", "wheel_loader": "machine", "dump_truck": "machine",
+        "roller_or_dozer": "machine", "vehicle": "vehicle", "reference": "reference",
+    }
+)  # fmt: skip
+"""Class to the row of `NOISE`."""
+
+MEMORY_S = 0.6
+"""Time after which an error, or a miss, of one entity is forgotten to 1/e."""
+
+NOISE: Mapping[str, ClassNoise] = MappingProxyType(
+    {
+        "worker": ClassNoise(
+            (2.0, 1.0, -4.0), (0.0, 0.0, 0.0, 0.0), 0.04, 0.8, (1.5, 0.8, -2.0), 0.8, 0.1, (-0.5, 0.6), (-1.5, 0.5)
+        ),
+        "machine": ClassNoise(
+            (3.0, 0.8, -4.0), (0.0, 0.0, 0.0, 0.0), 0.03, 1.0, (2.0, 0.5, -2.0), 0.8, 0.05, (1.0, 0.8), (-1.3, 0.6)
+        ),
+        "vehicle": ClassNoise(
+            (2.0, 0.8, -4.0), (0.0, 0.0, 0.0, 0.0), 0.04, 1.0, (1.5, 0.5, -2.0), 0.8, 0.05, (0.5, 0.8), (-1.3, 0.6)
+        ),
+        "reference": ClassNoise(
+            (3.0, 0.8, -4.0), (0.0, 0.0, 0.0, 0.0), 0.03, 1.0, (2.0, 0.5, -2.0), 0.8, 0.05, (1.0, 0.8), (-1.3, 0.6)
+        ),
+    }
+)
+
+
+class NoisyDetector:
+    """Draws detections frame after frame; errors of one entity go on for a while.
+
+    Args:
+        size_px: Width and height of the picture.
+        rng: Decides.
+        noise: By group of classes, for another detector.
+        memory_s: Of errors.
+    """
+
+    def __init__(
+        self, size_px: tuple[int, int], rng: np.random.Generator, noise: Mapping[str, ClassNoise] = NOISE,
+        memory_s: float = MEMORY_S,
+    ) -> None:  # fmt: skip
+        self._size_px, self._rng, self._noise, self._memory_s = np.array(size_px, np.float64), rng, noise, memory_s
+        self._latent: dict[int, tuple[float, FloatArray]] = {}
+
+    def detect(self, frame: int, time_s: float, entities: Sequence[Row]) -> list[Row]:
+        """Return rows of `DETECTIONS_SCHEMA`.
+
+        Args:
+            frame: Its index.
+            time_s: Of the frame, later than that of the call before.
+            entities: The frame's rows of `TRUTH_SCHEMA`.
+        """
+        found = [self._look(row, time_s) for row in entities if row["visible_px"]]
+        boxes = [box for box in found if box is not None] + self._imagine()
+        boxes.sort(key=lambda box: -box[1])
+        return [
+            {"frame": frame, "time_s": time_s, **dict(zip(("x1_px", "y1_px", "x2_px", "y2_px"), xyxy, strict=True))}
+            | {"score": score, "class": CLASSES[class_id].name, "class_id": class_id}
+            for xyxy, score, class_id in boxes
+        ]
+
+    def _look(self, row: Row, time_s: float) -> tuple[list[float], float, int] | None:
+        """Return box, score and class of one entity, or None when it is missed."""
+        noise = self._noise[GROUPS[row["class_name"]]]
+        box_px = np.array([row[name] for name in ("x1_px", "y1_px", "x2_px", "y2_px")])
+        sides_px = box_px[2:] - box_px[:2]
+        features = np.array([1.0, size_of(sides_px), 1.0 - row["visible_share"]])
+        latent = self._remembered(row["entity_id"], time_s)
+        if ndtr(latent[4]) > expit(features @ noise.found):
+            return None
+        along_px = np.tile(sides_px, 2)
+        outwards_px = noise.edge_bias * along_px + latent[:4] * np.hypot(noise.edge_share * along_px, noise.edge_px)
+        score = float(expit(features @ noise.score + noise.score_sigma * latent[5]))
+        cut = self._cut(box_px + outwards_px * [-1, -1, 1, 1])
+        return None if cut is None else (cut, float(np.clip(score, LEAST_SCORE, _SURE)), row["class_id"])
+
+    def _remembered(self, entity_id: int, time_s: float) -> FloatArray:
+        """Return (6,) standard normal numbers that change slowly."""
+        fresh = self._rng.normal(size=_LATENT)
+        before_s, before = self._latent.get(entity_id, (-np.inf, fresh))
+        kept = float(np.exp((before_s - time_s) / self._memory_s))
+        latent: FloatArray = kept * before + np.sqrt(1.0 - kept**2) * fresh
+        self._latent[entity_id] = time_s, latent
+        return latent
+
+    def _imagine(self) -> list[tuple[list[float], float, int]]:
+        """Return detections of nothing."""
+        imagined = []
+        for site_class in CLASSES:
+            noise = self._noise[GROUPS[site_class.name]]
+            for _ in range(int(self._rng.poisson(noise.false_per_frame))):
+                middle_px = self._rng.uniform(0.0, self._size_px)
+                shape = 2.0 ** self._rng.normal(0.0, 0.4)
+                side_px = USUAL_SIZE_PX * 2.0 ** self._rng.normal(*noise.false_size)
+                half_px = 0.5 * side_px * np.array([shape, 1.0 / shape])
+                cut = self._cut(np.concatenate([middle_px - half_px, middle_px + half_px]))
+                score = float(np.clip(expit(self._rng.normal(*noise.false_score)), LEAST_SCORE, _SURE))
+                if cut is not None:
+                    imagined.append((cut, score, site_class.id))
+        return imagined
+
+    def _cut(self, box_px: FloatArray) -> list[float] | None:
+        """Return a box cut at the picture's edge, or None when nothing worth a detection is left."""
+        low, high = np.maximum(box_px[:2], -0.5), np.minimum(box_px[2:], self._size_px - 0.5)
+        return [*low.tolist(), *high.tolist()] if (high - low >= _SMALLEST_PX).all() else None
+
+
+def size_of(sides_px: FloatArray) -> float:
+    """Return a box's size as `ClassNoise` counts it, from (2,) width and height.
+
+    >>> size_of(np.array([64.0, 64.0]))
+    1.0
+    """
+    return float(np.log2(max(float(np.sqrt(sides_px[0] * sides_px[1])), 1.0) / USUAL_SIZE_PX))

@@ -1,0 +1,208 @@
+"""What is believed of the camera from frame to frame: predicted by motion, corrected by observations.
+
+The belief is held at the motion's keyframe and carried from there to each frame, never from frame to frame: the error
+of following the picture does not add up, and each frame's observation improves the keyframe. Frames that follow each
+other see the same edges with the same stains and the same light: the observations of `_SAME_S` count as one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from standoff.core.homography import FloatArray
+from standoff.core.pose import POSE
+from standoff.core.types import CameraMotion, NoCameraMotion
+from standoff.stages.ground.carry import carry, since
+from standoff.stages.ground.solid import HEIGHT, STATE, SolidState
+from standoff.stages.ground.solid_fit import Belief
+
+_SAME_S, _SAME_UNSURE_S = 0.5, 4.0
+"""The second while the lens is unsure: errors of edges are then taken for the lens's, the same in each frame."""
+
+_LASTING_SHARE, _LASTING_UNSURE_SHARE = 0.3, 1.0
+"""Of one observation's variance so much is there in each and never averages out."""
+
+_SURE_FOCAL_SIGMA = 0.02
+_GUESSED_HEIGHT_SIGMA_M = 0.12
+"""A height read off the picture may be that of a shadow's edge: it is never surer than this."""
+
+_FLIGHT_MPS, _FLIGHT_RADPS = 5.0, 0.6
+"""How fast a drone may move and turn while nothing tells how."""
+
+_TIME_SLACK_S = 1e-6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Estimate:
+    """The state at one time.
+
+    Attributes:
+        state: Most likely.
+        covariance: (9, 9) of what averages out.
+        lasting: (9, 9) covariance of what does not.
+    """
+
+    state: SolidState
+    covariance: FloatArray
+    lasting: FloatArray
+
+    @property
+    def total(self) -> FloatArray:
+        """(9, 9) covariance of everything."""
+        return self.covariance + self.lasting
+
+    def belief(self) -> Belief:
+        """Return it as a prior for a fit."""
+        return Belief(self.state, _inverse(self.covariance))
+
+
+class PoseFilter:
+    """One stream's belief. `predict` comes first in each frame, then at most one `correct`."""
+
+    def __init__(self) -> None:
+        self._key: Estimate | None = None
+        self._key_s = 0.0
+        self._now: Estimate | None = None
+        self._now_s = 0.0
+        self._by_key = np.eye(STATE)
+        self._motion: CameraMotion | NoCameraMotion = NoCameraMotion("not yet")
+        self._key_motion: CameraMotion | NoCameraMotion = self._motion
+        self._observed_s = -np.inf
+        self._lasting_trace = np.inf
+        self._same_s, self._lasting_share = _SAME_S, _LASTING_SHARE
+        self._height_doubt_m2 = np.zeros((STATE, STATE))
+
+    @property
+    def now(self) -> Estimate | None:
+        """What is believed in the frame that was predicted last; None before the start."""
+        return self._now
+
+    @property
+    def observed_s(self) -> float:
+        """When an observation was last taken in; minus infinity before the first."""
+        return self._observed_s
+
+    def start(self, belief: Belief, time_s: float, *, height_known: bool = True) -> None:
+        """Begin, or begin again, with a belief about this frame; say whether the height was measured by hand."""
+        covariance = _inverse(belief.information)
+        lens_sure = covariance[6, 6] < _SURE_FOCAL_SIGMA**2
+        self._height_doubt_m2 = np.zeros((STATE, STATE))
+        if not height_known:
+            # The top is where it is seen: a higher solid puts the ground lower and the camera higher above it.
+            together = np.zeros(STATE)
+            together[[5, HEIGHT]] = _GUESSED_HEIGHT_SIGMA_M
+            self._height_doubt_m2 = np.outer(together, together)
+        self._same_s = _SAME_S if lens_sure else _SAME_UNSURE_S
+        self._lasting_share = _LASTING_SHARE if lens_sure else _LASTING_UNSURE_SHARE
+        lasting = self._lasting_share * covariance + self._height_doubt_m2
+        self._now = Estimate(belief.state, covariance, lasting)
+        self._now_s = self._observed_s = time_s
+        self._lasting_trace = _spread_m2(lasting)
+        self._rekey()
+
+    def predict(self, time_s: float, motion: CameraMotion | NoCameraMotion) -> bool:
+        """Carry the belief to a frame.
+
+        Returns:
+            Whether motion carried it; if not, all that is known is that a drone flies so fast at most.
+        """
+        if self._key is None or self._now is None:
+            self._motion = motion
+            return False
+        since_key = self._since_key(motion)
+        carried = None if since_key is None else carry(self._key.state.view, since_key, self._now.state.view)
+        self._motion = motion
+        if carried is None:
+            self._drift(max(time_s - self._now_s, 0.0))
+            self._now_s = time_s
+            self._rekey()
+            return False
+        self._by_key = carried.by_key
+        self._now = Estimate(
+            SolidState(carried.view, self._key.state.height_m),
+            carried.by_key @ self._key.covariance @ carried.by_key.T + carried.added,
+            carried.by_key @ self._key.lasting @ carried.by_key.T,
+        )
+        self._now_s = time_s
+        return True
+
+    def correct(self, state: SolidState, information: FloatArray) -> None:
+        """Take in an observation of this frame.
+
+        Args:
+            state: The most likely one given prediction and observation together, the observation at full weight.
+            information: (9, 9) that the observation adds at full weight.
+        """
+        assert self._key is not None and self._now is not None, "predicted first"
+        fresh = min(max((self._now_s - self._observed_s) / self._same_s, 0.0), 1.0)
+        before = _inverse(self._now.covariance)
+        pull = (before + information) @ state.change_from(self._now.state)
+        covariance = _inverse(before + fresh * information)
+        change = fresh * (covariance @ pull)
+        gain = self._key.covariance @ self._by_key.T @ before
+        key_covariance = self._key.covariance + gain @ (covariance - self._now.covariance) @ gain.T
+        lasting = self._lasting(before, information)
+        self._key = Estimate(
+            self._key.state.changed(gain @ change),
+            (key_covariance + key_covariance.T) / 2.0,
+            self._key.lasting if lasting is None else gain @ lasting @ gain.T,
+        )
+        self._now = Estimate(
+            self._now.state.changed(change), covariance, self._now.lasting if lasting is None else lasting
+        )
+        self._observed_s = self._now_s
+
+    def _lasting(self, before: FloatArray, information: FloatArray) -> FloatArray | None:
+        """Return the lasting covariance that goes with the best observation so far, or None if it is an earlier one.
+
+        What was known of the lens before the first picture belongs to an observation by itself.
+        """
+        assert self._now is not None
+        alone = information + np.diag(1.0 / np.maximum(np.diag(self._now.covariance), 1e-12)) * np.array(
+            [0.0] * 6 + [1.0] * 3
+        )
+        try:
+            lasting = self._lasting_share * np.linalg.inv(alone + 1e-6 * before) + self._height_doubt_m2
+        except np.linalg.LinAlgError:
+            return None
+        trace = _spread_m2(lasting)
+        if not trace < self._lasting_trace:
+            return None
+        self._lasting_trace = trace
+        return lasting
+
+    def _since_key(self, motion: CameraMotion | NoCameraMotion) -> CameraMotion | None:
+        """Return the motion since the frame at which the belief is held, which need not be the motion's keyframe."""
+        if isinstance(motion, NoCameraMotion):
+            return None
+        if _same_time(motion.keyframe_s, self._now_s) and not _same_time(self._key_s, self._now_s):
+            self._rekey()
+        if _same_time(motion.keyframe_s, self._key_s):
+            return motion
+        if isinstance(self._key_motion, CameraMotion) and _same_time(motion.keyframe_s, self._key_motion.keyframe_s):
+            return since(self._key_motion, motion)
+        return None
+
+    def _rekey(self) -> None:
+        self._key, self._key_s, self._key_motion = self._now, self._now_s, self._motion
+        self._by_key = np.eye(STATE)
+
+    def _drift(self, seconds: float) -> None:
+        assert self._now is not None
+        sigma = np.array([_FLIGHT_RADPS] * 3 + [_FLIGHT_MPS] * 3 + [0.0] * 3) * seconds
+        covariance = self._now.covariance + np.diag(sigma**2)
+        self._now = Estimate(self._now.state, covariance, self._now.lasting)
+
+
+def _inverse(matrix: FloatArray) -> FloatArray:
+    return np.asarray(np.linalg.inv(matrix), dtype=np.float64)
+
+
+def _same_time(first_s: float, second_s: float) -> bool:
+    return abs(first_s - second_s) <= _TIME_SLACK_S
+
+
+def _spread_m2(covariance: FloatArray) -> float:
+    return float(np.trace(covariance[POSE, POSE][3:, 3:]))

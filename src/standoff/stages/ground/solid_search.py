@@ -1,0 +1,301 @@
+"""Find the reference in a box of one picture when nothing is known of where the camera is.
+
+Every quadrilateral that the edges in the box make is taken for the top of the solid and for its base, each way round
+and from both places from which a camera could see it so. The whole solid is then laid over the picture, and the
+place wins at which the picture has most of its edges.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from standoff.core.camera import Camera, CameraPrior
+from standoff.core.homography import FloatArray
+from standoff.core.pose import LENS, SHIFT, TURN, View
+from standoff.core.types import ImageArray, NoGroundMap
+from standoff.stages.ground.edges import between_pixels, canny, sobel_gradients
+from standoff.stages.ground.oriented import likely_quadrilaterals, noise_thresholds
+from standoff.stages.ground.outline import BOX_OUTSIDE, TOO_FEW_EDGES, undistorted_box
+from standoff.stages.ground.quadrilateral import NO_QUADRILATERAL, ORDERS
+from standoff.stages.ground.shape import ReferenceShape
+from standoff.stages.ground.solid import HEIGHT, STATE, SolidState
+from standoff.stages.ground.solid_edges import Blurred
+from standoff.stages.ground.solid_fit import Belief, SolidFit, fit_solid, outline_support
+
+AMBIGUOUS = "the reference could lie in two ways"
+NOT_THERE = "no solid of the reference's shape fits the edges in its box"
+
+_MIN_EDGES = 16
+_QUADRILATERALS = 24
+_MARGIN = 0.12
+"""The search goes this share of the box's longer side beyond the box: detectors cut corners."""
+
+_REPROJECTION_PX, _REPROJECTION_SHARE = 2.0, 0.08
+_ROLL_SIGMA_RAD = np.deg2rad(5.0)
+"""Gimbals keep the horizon level; hands nearly so."""
+
+_MAX_ROLL_RAD = np.deg2rad(30.0)
+_MIN_PITCH_RAD = np.deg2rad(5.0)
+_BARE_COST, _ROLL_COST, _PATCHY = 0.45, 0.1, 0.33
+_REFINED = 4
+_FIT_PX = 4.0
+_RIVAL_SCORE, _RIVAL_PX = 0.9, 4.0
+_MIN_SIDE_SUPPORT, _MIN_MEAN_SUPPORT, _MIN_OTHER_SUPPORT = 0.5, 0.8, 0.85
+"""So much of the sides must be seen when nothing else says that the reference is there."""
+
+_SMOOTHINGS_PX = (0.0, 2.0)
+
+
+@dataclass(frozen=True, slots=True)
+class HeightPrior:
+    """What is known of the reference's height.
+
+    Attributes:
+        height_m: The most likely one.
+        sigma_m: Its standard error.
+        tried_m: Heights to begin with.
+    """
+
+    height_m: float
+    sigma_m: float
+    tried_m: tuple[float, ...]
+
+    @classmethod
+    def known(cls, height_m: float) -> HeightPrior:
+        """Return a height by tape measure, good to a centimetre or two."""
+        return cls(height_m, 0.01 + 0.02 * height_m, (height_m,))
+
+    @classmethod
+    def unknown(cls) -> HeightPrior:
+        """Return what can be said of any footing or plate."""
+        return cls(0.35, 0.25, (0.0, 0.15, 0.3, 0.45, 0.6, 0.9))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Found:
+    """The reference in one picture.
+
+    Attributes:
+        fit: Where, from all edges.
+        prior: What was known beforehand, to which `fit.information` adds.
+    """
+
+    fit: SolidFit
+    prior: Belief
+
+    def belief(self) -> Belief:
+        """Return what is known now."""
+        return Belief(self.fit.state, self.prior.information + self.fit.information)
+
+
+def search_solid(
+    gray: ImageArray, box_xyxy_px: FloatArray, shape: ReferenceShape, camera: CameraPrior, height: HeightPrior
+) -> Found | NoGroundMap:
+    """Find the reference in a box.
+
+    Args:
+        gray: (H, W).
+        box_xyxy_px: (4,) about where; it may cut corners or take in shadows.
+        shape: True shape.
+        camera: What is known of it, for pictures of this size.
+        height: What is known of the reference's height.
+
+    Returns:
+        The reference, or why it cannot be told where it is. For a shape that can be turned onto itself corner 0 is
+        as arbitrary as the order in which the ways were tried.
+    """
+    margin = _MARGIN * float((box_xyxy_px[2:] - box_xyxy_px[:2]).max())
+    box = box_xyxy_px + np.array([-margin, -margin, margin, margin])
+    picture = Blurred.around(gray, box.reshape(2, 2), margin)
+    if picture is None:
+        return NoGroundMap(BOX_OUTSIDE)
+    found: Found | NoGroundMap = NoGroundMap(NOT_THERE)
+    for smoothing_px in _SMOOTHINGS_PX:
+        found = _search(gray, picture, box, shape, camera, height, smoothing_px)
+        if isinstance(found, Found):
+            break
+    return found
+
+
+def _search(
+    gray: ImageArray,
+    picture: Blurred,
+    box: FloatArray,
+    shape: ReferenceShape,
+    camera: CameraPrior,
+    height: HeightPrior,
+    smoothing_px: float,
+) -> Found | NoGroundMap:
+    outlines = _outlines(gray, box, camera.camera, smoothing_px)
+    if isinstance(outlines, NoGroundMap):
+        return outlines
+    states = [state for outline in outlines for state in _states(outline, shape, camera.camera, height)]
+    if not states:
+        return NoGroundMap(NO_QUADRILATERAL)
+    scores = np.array([_score(picture, shape, state, box) for state in states])
+    fits: list[tuple[float, Found]] = []
+    for k in np.argsort(-scores, kind="stable")[: _REFINED * len(height.tried_m)]:
+        if len(fits) == _REFINED:
+            break
+        prior = _prior(states[k], camera, height)
+        fit = fit_solid(gray, shape, prior, _FIT_PX, start=states[k])
+        if fit is not None and _believable(fit, shape):
+            score = _score(picture, shape, fit.state, box)
+            if score > 0:
+                fits.append((score, Found(fit, prior)))
+    return _best(fits, shape)
+
+
+def _outlines(gray: ImageArray, box: FloatArray, camera: Camera, smoothing_px: float) -> FloatArray | NoGroundMap:
+    """Return (Q, 4, 2) quadrilaterals in a box; smoothing finds faint edges in noise, and loses fine ones."""
+    if smoothing_px > 0:
+        gray = _smoothed_in(gray, box, smoothing_px)
+    gradients = sobel_gradients(gray, box)
+    if gradients is None:
+        return NoGroundMap(BOX_OUTSIDE)
+    edges = between_pixels(canny(gradients, *noise_thresholds(gradients)), gradients).undistorted(camera)
+    if len(edges) < _MIN_EDGES:
+        return NoGroundMap(TOO_FEW_EDGES)
+    return likely_quadrilaterals(edges, undistorted_box(box, camera), _QUADRILATERALS)
+
+
+def _smoothed_in(gray: ImageArray, box: FloatArray, smoothing_px: float) -> ImageArray:
+    """Return the picture, smoothed in and around a box."""
+    margin = int(4 * smoothing_px) + 8
+    height, width = gray.shape
+    left, top = np.maximum(np.floor(box[:2]).astype(int) - margin, 0)
+    right, bottom = np.minimum(np.ceil(box[2:]).astype(int) + margin, (width, height))
+    smooth = gray.copy()
+    smooth[top:bottom, left:right] = cv2.GaussianBlur(gray[top:bottom, left:right], (0, 0), smoothing_px)
+    return smooth
+
+
+def _believable(fit: SolidFit, shape: ReferenceShape) -> bool:
+    """Return whether the picture has enough of the sides: of every one, or of all but one and of the solid below."""
+    count = len(shape.corners_m)
+    sides = np.sort(fit.side_support(count))
+    if sides[0] >= _MIN_SIDE_SUPPORT and sides.mean() >= _MIN_MEAN_SUPPORT:
+        return True
+    lower = fit.support[(fit.lower_side >= 0) & np.isfinite(fit.support)]
+    return bool(sides[1] >= _MIN_OTHER_SUPPORT and len(lower) and lower.max() >= _MIN_OTHER_SUPPORT)
+
+
+def _best(fits: list[tuple[float, Found]], shape: ReferenceShape) -> Found | NoGroundMap:
+    """Return the fit with the best score, unless another one elsewhere is as good."""
+    if not fits:
+        return NoGroundMap(NOT_THERE)
+    fits = sorted(fits, key=lambda one: -one[0])
+    best_score, best = fits[0]
+    outline = _top_px(best.fit.state, shape)
+    for score, other in fits[1:]:
+        apart = np.linalg.norm(_top_px(other.fit.state, shape)[_orders(shape)] - outline, axis=-1).max(axis=-1).min()
+        if score >= _RIVAL_SCORE * best_score and apart > _RIVAL_PX:
+            return NoGroundMap(AMBIGUOUS)
+    return best
+
+
+def _orders(shape: ReferenceShape) -> FloatArray:
+    return np.asarray(ORDERS[list(shape.turns_onto_itself())])
+
+
+def _top_px(state: SolidState, shape: ReferenceShape) -> FloatArray:
+    return state.view.project(np.column_stack([shape.corners_m, np.full(len(shape.corners_m), state.height_m)]))
+
+
+def _states(outline: FloatArray, shape: ReferenceShape, camera: Camera, height: HeightPrior) -> Iterator[SolidState]:
+    """Give every state at which the top or the base of the solid has this outline."""
+    limit_px = max(_REPROJECTION_PX, _REPROJECTION_SHARE * float(np.linalg.norm(outline[1] - outline[0])))
+    turns = shape.turns_onto_itself()
+    for order in ORDERS[: 4 // len(turns)]:
+        for view in _views(outline[order], shape, camera, limit_px):
+            for height_m in height.tried_m:
+                for level_m in {height_m, 0.0}:
+                    lifted = View(camera, view.position_m + np.array([0.0, 0.0, level_m]), view.site_to_camera)
+                    yield SolidState(lifted, height_m)
+
+
+def _views(corners_px: FloatArray, shape: ReferenceShape, camera: Camera, limit_px: float) -> Iterator[View]:
+    """Give the views from above, nearly level, from which the shape at z = 0 has these corners."""
+    places = np.column_stack([shape.corners_m, np.zeros(len(shape.corners_m))])
+    middle = places.mean(axis=0)
+    found, turns, shifts, errors = cv2.solvePnPGeneric(
+        places - middle, corners_px[:, None], camera.matrix, None, flags=cv2.SOLVEPNP_IPPE
+    )
+    for k in range(found):
+        if float(np.ravel(errors[k])[0]) > limit_px:
+            continue
+        rotation = cv2.Rodrigues(turns[k])[0]
+        left, _, right = np.linalg.svd(rotation)
+        rotation = left @ right
+        view = View(camera, middle - rotation.T @ shifts[k].ravel(), rotation)
+        roll, pitch = _roll_and_pitch(view)
+        if view.position_m[2] > 0 and abs(roll) < _MAX_ROLL_RAD and pitch > _MIN_PITCH_RAD:
+            yield view
+
+
+def _roll_and_pitch(view: View) -> tuple[float, float]:
+    """Return how far the picture's right side is down, and how far the camera looks down; rad."""
+    right, down, forward = view.site_to_camera
+    pitch = float(np.arcsin(np.clip(-forward[2], -1.0, 1.0)))
+    # Looking straight down there is no roll: every turn is one of heading.
+    level = max(float(np.hypot(right[2], down[2])), 1e-9)
+    return float(np.arcsin(np.clip(-right[2] / level, -1.0, 1.0)) * np.cos(pitch)), pitch
+
+
+def _score(picture: Blurred, shape: ReferenceShape, state: SolidState, box: FloatArray) -> float:
+    """Return px of outline that the picture has, less what is bare of the top, less what is unlikely."""
+    samples, support = outline_support(picture, shape, state)
+    support = np.nan_to_num(support, nan=0.0)
+    length = samples.length_px
+    corners = len(shape.corners_m)
+    top = float((length[:corners] * (support[:corners] - _BARE_COST)).sum())
+    lower = float((length[corners:] * np.maximum(support[corners:] - _BARE_COST, 0.0)).sum())
+    roll, _ = _roll_and_pitch(state.view)
+    top_px = _top_px(state, shape)
+    unlikely = _ROLL_COST * (roll / _ROLL_SIGMA_RAD) ** 2 + _outside_share(top_px, box) + _patchy_share(picture, top_px)
+    return float(top + lower - unlikely * length[:corners].sum())
+
+
+def _patchy_share(picture: Blurred, top_px: FloatArray) -> float:
+    """Return the share of the upper face that is much darker or brighter than the rest: half of it lies in shade."""
+    if not np.isfinite(top_px).all():
+        return 1.0
+    u, v = np.meshgrid(np.linspace(0.15, 0.85, 8), np.linspace(0.15, 0.85, 8))
+    u, v = u.reshape(-1, 1), v.reshape(-1, 1)
+    grid = (top_px[0] * (1 - u) + top_px[1] * u) * (1 - v) + (top_px[3] * (1 - u) + top_px[2] * u) * v
+    columns, rows = np.rint(grid - (picture.left_px, picture.top_px)).astype(np.int64).T
+    height, width = picture.values.shape
+    inside = (columns >= 0) & (rows >= 0) & (columns < width) & (rows < height)
+    values = picture.values[rows[inside], columns[inside]]
+    if not len(values):
+        return 1.0
+    middle = float(np.median(values))
+    return float((np.abs(values - middle) > _PATCHY * max(middle, 1.0)).mean())
+
+
+def _outside_share(points_px: FloatArray, box: FloatArray) -> float:
+    """Return how far points (N, 2) lie outside a box, as a share of its size; far if they cannot be seen."""
+    if not np.isfinite(points_px).all():
+        return 10.0
+    beyond = np.maximum(box[:2] - points_px, points_px - box[2:]).max()
+    return max(float(beyond) / float((box[2:] - box[:2]).min()), 0.0)
+
+
+def _prior(state: SolidState, camera: CameraPrior, height: HeightPrior) -> Belief:
+    """Return what is known before the picture is looked at: lens, height, and that cameras are held level."""
+    sigma = np.full(STATE, np.inf)
+    sigma[TURN], sigma[SHIFT] = 1.0, 100.0
+    sigma[LENS] = camera.focal_sigma, camera.k1_sigma
+    sigma[HEIGHT] = height.sigma_m
+    roll, _ = _roll_and_pitch(state.view)
+    level = np.zeros(STATE)
+    level[2] = -roll
+    start = state.changed(level)
+    information = np.diag(1.0 / sigma**2)
+    information[2, 2] = 1.0 / _ROLL_SIGMA_RAD**2
+    view = View(camera.camera, start.view.position_m, start.view.site_to_camera)
+    return Belief(SolidState(view, height.height_m), information[:STATE, :STATE])

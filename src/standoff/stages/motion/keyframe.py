@@ -1,0 +1,233 @@
+"""The picture from which the motion counts, its points, and how they are found again in another one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from standoff.core import homography
+from standoff.core.homography import BoolArray, FloatArray
+from standoff.core.types import IntArray
+from standoff.stages.motion.follow import follow_points
+from standoff.stages.motion.lens import Lens
+from standoff.stages.motion.movers import inside
+from standoff.stages.motion.params import MotionParams
+from standoff.stages.motion.picture import FollowedPicture
+from standoff.stages.motion.plane import MIN_PAIRS, PlaneMotion, fit_plane
+
+_MORE = 4
+_TRUST_STEP = 0.25
+_TRUSTED = 0.4
+_FEWER_INLIERS = 0.6
+"""Share of the first picture's points of the ground below which a keyframe is worn out."""
+
+_CELLS = (4, 3)
+_LEAST_CELLS = 3
+"""Parts of the picture in which there must be ground: what lies in one corner says nothing of the rest."""
+
+
+@dataclass(frozen=True, slots=True)
+class Match:
+    """A keyframe found again.
+
+    Attributes:
+        plane: How the ground moved, from the keyframe's pixels to the picture's, without lens distortion.
+        in_view: How many of the keyframe's points are in the picture and not behind something that moves.
+        inliers: How many of those move with the ground.
+        noise_px: Standard error of a point along an axis by how the residuals changed since the picture before; NaN
+            where it is not known.
+    """
+
+    plane: PlaneMotion
+    in_view: int
+    inliers: int
+    noise_px: float
+
+
+@dataclass(slots=True, eq=False)
+class _Points:
+    """Points of a keyframe.
+
+    Attributes:
+        small_px: (N, 2) followed pixels.
+        ideal_px: (N, 2) frame pixels without lens distortion.
+        trust: (N,) how often each moved with the ground of late, 0 to 1.
+        residual_px: (N, 2) how far each was from its place in the picture before; NaN unknown.
+    """
+
+    small_px: FloatArray
+    ideal_px: FloatArray
+    trust: FloatArray
+    residual_px: FloatArray
+
+    @classmethod
+    def of(cls, small_px: FloatArray, picture: FollowedPicture, lens: Lens) -> _Points:
+        """Take points of a picture, those that its lens can see."""
+        ideal_px = lens.undistorted(picture.to_full(small_px))
+        known = np.isfinite(ideal_px).all(axis=1)
+        small_px, ideal_px = small_px[known], ideal_px[known]
+        return cls(small_px, ideal_px, np.ones(len(small_px)), np.full_like(small_px, np.nan))
+
+
+class Keyframe:
+    """A picture and well-textured points spread over it.
+
+    A point that has moved otherwise than the ground is trusted less, so that a second plane, a roof or a lorry that no
+    detector knows, does not become the ground from one picture to the next.
+
+    Args:
+        picture: The keyframe.
+        movers_px: (M, 4) boxes in frame pixels in which nothing is ground.
+        lens: At the frame's size.
+        params: Settings.
+    """
+
+    def __init__(self, picture: FollowedPicture, movers_px: FloatArray, lens: Lens, params: MotionParams) -> None:
+        self.picture = picture
+        self._lens, self._params = lens, params
+        edge = params.window_px // 2 + 1
+        self._points = _Points.of(picture.corners(params.points, movers_px, edge), picture, lens)
+        self._more_points = _Points.of(picture.corners(_MORE * params.points, movers_px, edge), picture, lens)
+        self._first_inliers = 0
+
+    @property
+    def usable(self) -> bool:
+        """Whether there is enough to follow."""
+        small_px = self._points.small_px
+        return len(small_px) >= self._params.min_points and _is_spread(small_px, self.picture)
+
+    def find(self, picture: FollowedPicture, expected: FloatArray, movers_px: FloatArray, levels: int) -> Match | None:
+        """Look for the keyframe's ground in another picture.
+
+        Args:
+            picture: Of the same size.
+            expected: (N, 2) where its points may be, frame pixels without distortion; see `expect`.
+            movers_px: (M, 4) boxes in frame pixels in which nothing is ground.
+            levels: How often the pictures are halved: 1 where the expectation is good.
+
+        Returns:
+            None where too few points move alike.
+        """
+        return self._found(self._points, picture, expected, movers_px, levels)
+
+    def find_better(self, picture: FollowedPicture, match: Match, movers_px: FloatArray) -> Match:
+        """Look again with many more points, where an error would stay: in a picture that becomes the keyframe.
+
+        Returns:
+            The match as it is where that fails.
+        """
+        expected, _ = homography.apply(match.plane.matrix, self._more_points.ideal_px)
+        better = self._found(self._more_points, picture, expected, movers_px, 0)
+        return match if better is None else replace(match, plane=better.plane)
+
+    def _found(
+        self, points: _Points, picture: FollowedPicture, expected: FloatArray, movers_px: FloatArray, levels: int
+    ) -> Match | None:
+        start_px = self._lens.distorted(expected)
+        seen = self._in_view(picture, start_px, movers_px)
+        if np.count_nonzero(seen) < self._params.min_points:
+            return None
+        end_px, good = follow_points(
+            self.picture.gray,
+            picture.gray,
+            points.small_px[seen],
+            picture.to_small(start_px[seen]),
+            window_px=self._params.window_px,
+            levels=levels,
+            round_trip_px=self._params.round_trip_px,
+        )
+        target = picture.to_full(end_px)
+        good &= ~inside(target, movers_px)
+        target = self._lens.undistorted(target)
+        good &= np.isfinite(target).all(axis=1)
+        return self._agreed(points, picture, np.flatnonzero(seen)[good], target[good], int(seen.sum()))
+
+    def expect(self, pose: FloatArray, step: FloatArray | None, ratio: float) -> FloatArray:
+        """Return (N, 2) where the points should be: where they were last, and on by a share of the last step.
+
+        Args:
+            pose: (3, 3) motion from the keyframe to the picture before.
+            step: (3, 3) from the one before that to the picture before; None if unknown.
+            ratio: How many times that step.
+        """
+        last, _ = homography.apply(pose, self._points.ideal_px)
+        if step is None:
+            return last
+        earlier, valid = homography.apply(homography.invert(step), last)
+        return np.where(valid[:, None], last + ratio * (last - earlier), last)
+
+    def is_worn_out(self, match: Match, centre_px: FloatArray) -> bool:
+        """Say whether the view has changed so much since the keyframe that a new one is due.
+
+        Args:
+            match: Of the picture in question.
+            centre_px: (2,) middle of the picture.
+        """
+        params = self._params
+        self._first_inliers = self._first_inliers or match.inliers
+        if match.in_view < params.min_overlap * len(self._points.small_px):
+            return True
+        if match.inliers < _FEWER_INLIERS * self._first_inliers:
+            return True
+        jacobian = homography.point_jacobian(match.plane.matrix, centre_px)[0]
+        if not np.isfinite(jacobian).all():
+            return True
+        left, scales, right = np.linalg.svd(jacobian)
+        turn = left @ right
+        turned_deg = abs(np.degrees(np.arctan2(turn[1, 0], turn[0, 0])))
+        return bool(
+            turned_deg > params.max_turn_deg or scales[0] > params.max_scale or scales[1] < 1.0 / params.max_scale
+        )
+
+    def _agreed(
+        self, points: _Points, picture: FollowedPicture, which: IntArray, target: FloatArray, in_view: int
+    ) -> Match | None:
+        """Return what most of the points `which` (K,) tell, found at `target` (K, 2) without distortion."""
+        params, scale = self._params, float(picture.full_per_small.mean())
+        plane = fit_plane(
+            points.ideal_px[which],
+            target,
+            trusted=points.trust[which] >= _TRUSTED,
+            inlier_px=params.inlier_px * scale,
+            followed_px=scale,
+        )
+        if plane is None:
+            return None
+        inliers = int(np.count_nonzero(plane.inlier))
+        if inliers < max(params.min_points, params.min_inliers * in_view):
+            return None
+        if not _is_spread(picture.to_small(target[plane.inlier]), picture):
+            return None
+        points.trust[which] += _TRUST_STEP * (plane.inlier - points.trust[which])
+        changed = (plane.residual_px - points.residual_px[which])[plane.inlier]
+        points.residual_px[:] = np.nan
+        points.residual_px[which] = plane.residual_px
+        return Match(plane, in_view, inliers, _noise_px(changed))
+
+    def _in_view(self, picture: FollowedPicture, start_px: FloatArray, movers_px: FloatArray) -> BoolArray:
+        edge = self._params.window_px / 2.0
+        small = picture.to_small(start_px)
+        height, width = picture.gray.shape
+        with np.errstate(invalid="ignore"):
+            within = (small >= edge) & (small <= np.array([width, height]) - 1.0 - edge)
+        seen: BoolArray = np.all(within, axis=1) & ~inside(start_px, movers_px)
+        return seen
+
+
+def _is_spread(small_px: FloatArray, picture: FollowedPicture) -> bool:
+    height, width = picture.gray.shape
+    # Without distortion a point may lie a little outside.
+    cell = np.clip(small_px / np.array([width, height]) * _CELLS, 0, np.array(_CELLS) - 1).astype(np.int64)
+    return len(np.unique(cell[:, 1] * _CELLS[0] + cell[:, 0])) >= _LEAST_CELLS
+
+
+def _noise_px(changed_px: FloatArray) -> float:
+    """Return what following adds at random, from the (N, 2) changes of the same points' residuals; NaN rows unknown.
+
+    Heights change a residual slowly. The noise of both pictures changes it from one to the next, and a residual holds
+    that of two pictures as well, the keyframe's and the last one's.
+    """
+    length = np.hypot(changed_px[:, 0], changed_px[:, 1])
+    length = length[np.isfinite(length)]
+    return float(np.median(length)) / 1.177 if len(length) >= MIN_PAIRS else np.nan

@@ -1,0 +1,117 @@
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pytest
+from scipy.special import expit, logit
+
+from standoff.core.classes import CLASSES
+from standoff.core.homography import FloatArray
+from standoff.simulation.detection_noise import (
+    DETECTIONS_SCHEMA,
+    GROUPS,
+    LEAST_SCORE,
+    NOISE,
+    ClassNoise,
+    NoisyDetector,
+    size_of,
+)
+
+_SIZE_PX = (1280, 720)
+_SIDES = ("x1_px", "y1_px", "x2_px", "y2_px")
+_NONE_FALSE = {name: replace(noise, false_per_frame=0.0) for name, noise in NOISE.items()}
+_COUNT = 4000
+
+
+def _worker(
+    entity_id: int = 1, box_px: tuple[float, ...] = (600.0, 300.0, 624.0, 348.0), **more: Any
+) -> dict[str, Any]:
+    named = dict(zip(_SIDES, box_px, strict=True))
+    seen = {"entity_id": entity_id, "class_name": "worker", "class_id": 0, "visible_px": 500, "visible_share": 1.0}
+    return named | seen | more
+
+
+def _found(noise: Mapping[str, ClassNoise], row: dict[str, Any], seed: int = 0) -> list[dict[str, Any]]:
+    """Look at many entities alike, once each."""
+    detector = NoisyDetector(_SIZE_PX, np.random.default_rng(seed), noise)
+    return detector.detect(0, 0.0, [row | {"entity_id": k} for k in range(_COUNT)])
+
+
+def _boxes(rows: list[dict[str, Any]]) -> FloatArray:
+    return np.array([[row[side] for side in _SIDES] for row in rows])
+
+
+def test_the_table_has_a_row_for_every_class() -> None:
+    assert set(GROUPS) == {site_class.name for site_class in CLASSES}
+    assert set(GROUPS.values()) == set(NOISE)
+
+
+def test_a_detector_without_errors_finds_the_truth() -> None:
+    exact = {
+        name: replace(noise, found=(50.0, 0.0, 0.0), edge_bias=(0, 0, 0, 0), edge_share=0.0, edge_px=0.0)
+        for name, noise in _NONE_FALSE.items()
+    }
+    (row,) = NoisyDetector(_SIZE_PX, np.random.default_rng(0), exact).detect(7, 0.5, [_worker()])
+    assert [row[side] for side in _SIDES] == [600.0, 300.0, 624.0, 348.0]
+    assert (row["frame"], row["time_s"], row["class"], row["class_id"]) == (7, 0.5, "worker", 0)
+    assert list(row) == DETECTIONS_SCHEMA.names
+    pa.Table.from_pylist([row], schema=DETECTIONS_SCHEMA)
+
+
+@pytest.mark.parametrize("share", [1.0, 0.5, 0.2])
+def test_who_is_hidden_is_missed_as_often_as_the_table_says(share: float) -> None:
+    noise = _NONE_FALSE | {"worker": replace(_NONE_FALSE["worker"], found=(1.0, 0.5, -3.0))}
+    found = len(_found(noise, _worker(visible_share=share))) / _COUNT
+    size = size_of(np.array([24.0, 48.0]))
+    assert found == pytest.approx(float(expit(1.0 + 0.5 * size - 3.0 * (1.0 - share))), abs=4 * 0.5 / _COUNT**0.5)
+
+
+def test_nobody_is_found_where_nothing_shows() -> None:
+    assert NoisyDetector(_SIZE_PX, np.random.default_rng(0), _NONE_FALSE).detect(0, 0.0, [_worker(visible_px=0)]) == []
+
+
+def test_edges_are_off_by_the_bias_and_the_deviation_of_the_table() -> None:
+    noise = _NONE_FALSE | {
+        "worker": replace(NOISE["worker"], found=(50.0, 0, 0), edge_bias=(0.1, 0, 0, -0.05), edge_share=0.05,
+                          edge_px=1.0, false_per_frame=0.0)
+    }  # fmt: skip
+    outwards_px = (_boxes(_found(noise, _worker())) - [600.0, 300.0, 624.0, 348.0]) * [-1, -1, 1, 1]
+    sigma_px = np.hypot(0.05 * np.array([24.0, 48.0, 24.0, 48.0]), 1.0)
+    np.testing.assert_allclose(outwards_px.mean(axis=0), [2.4, 0.0, 0.0, -2.4], atol=4 * sigma_px.max() / _COUNT**0.5)
+    np.testing.assert_allclose(outwards_px.std(axis=0), sigma_px, rtol=4 / (2 * _COUNT) ** 0.5)
+
+
+def test_scores_lie_between_the_detectors_threshold_and_one_and_about_where_the_table_says() -> None:
+    noise = _NONE_FALSE | {"worker": replace(_NONE_FALSE["worker"], found=(50.0, 0, 0), score=(1.0, 0, 0))}
+    scores = np.array([row["score"] for row in _found(noise, _worker())])
+    assert scores.min() >= LEAST_SCORE and scores.max() < 1.0
+    assert (np.diff(scores) <= 0).all(), "the surest first"
+    assert float(np.median(logit(scores))) == pytest.approx(1.0, abs=0.1)
+
+
+def test_false_alarms_are_as_many_as_the_table_says_and_lie_in_the_picture() -> None:
+    detector = NoisyDetector(_SIZE_PX, np.random.default_rng(3))
+    rows = [row for frame in range(400) for row in detector.detect(frame, frame / 10, [])]
+    per_frame = sum(NOISE[GROUPS[site_class.name]].false_per_frame for site_class in CLASSES)
+    assert len(rows) / 400 == pytest.approx(per_frame, abs=5 * (per_frame / 400) ** 0.5)
+    boxes_px = _boxes(rows)
+    assert (boxes_px[:, :2] >= -0.5).all() and (boxes_px[:, 2:] <= np.array(_SIZE_PX) - 0.5).all()
+    assert (boxes_px[:, 2:] > boxes_px[:, :2]).all()
+
+
+@pytest.mark.parametrize("gap_s", [0.1, 1.0])
+def test_an_error_goes_on_for_a_while_however_often_one_looks(gap_s: float) -> None:
+    noise = _NONE_FALSE | {"worker": replace(_NONE_FALSE["worker"], found=(50.0, 0, 0))}
+    detector = NoisyDetector(_SIZE_PX, np.random.default_rng(5), noise, memory_s=0.5)
+    left_px = [detector.detect(k, k * gap_s, [_worker()])[0]["x1_px"] for k in range(_COUNT)]
+    expected = np.exp(-gap_s / 0.5)
+    assert np.corrcoef(left_px[1:], left_px[:-1])[0, 1] == pytest.approx(expected, abs=0.06)
+
+
+def test_the_same_generator_finds_the_same() -> None:
+    assert _found(NOISE, _worker(), 4) == _found(NOISE, _worker(), 4)
+    assert _found(NOISE, _worker(), 4) != _found(NOISE, _worker(), 5)
