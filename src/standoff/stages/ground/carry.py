@@ -9,7 +9,7 @@ import numpy as np
 from standoff.core import homography
 from standoff.core.camera import Camera
 from standoff.core.homography import FloatArray
-from standoff.core.pose import LENS, POSE, View
+from standoff.core.pose import CHANGES, LENS, POSE, View
 from standoff.core.types import CameraMotion
 from standoff.stages.ground.solid import STATE
 
@@ -62,10 +62,8 @@ def carry(key: View, motion: CameraMotion, guess: View) -> Carried | None:
         misfit = (moved_px - points_px).ravel()
         if not np.isfinite(misfit).all():
             return None
-        pose = by_view[:, :, POSE].reshape(-1, 6)
-        solve = np.linalg.pinv(pose)
-        change = np.zeros(8)
-        change[POSE] = solve @ misfit
+        change = np.zeros(CHANGES)
+        change[POSE] = np.linalg.lstsq(by_view[:, :, POSE].reshape(-1, 6), misfit, rcond=None)[0]
         now = now.changed(change)
         if np.abs(change).max() < 1e-7:
             break
@@ -74,7 +72,7 @@ def carry(key: View, motion: CameraMotion, guess: View) -> Carried | None:
     rms_px = float(np.sqrt((misfit**2).mean()))
     if not rms_px < _MAX_MISFIT_PX:
         return None
-    solve = np.linalg.pinv(by_view[:, :, POSE].reshape(-1, 6))
+    solve = np.asarray(np.linalg.pinv(by_view[:, :, POSE].reshape(-1, 6)), dtype=np.float64)
     return Carried(
         view=View(key.camera, now.position_m, now.site_to_camera),
         by_key=_by_key(then, places, by_view, by_point, solve, lens_known=motion.camera is not None),

@@ -49,7 +49,7 @@ class Estimate:
 
     def belief(self) -> Belief:
         """Return it as a prior for a fit."""
-        return Belief(self.state, np.linalg.inv(self.covariance))
+        return Belief(self.state, _inverse(self.covariance))
 
 
 class PoseFilter:
@@ -76,7 +76,7 @@ class PoseFilter:
 
     def start(self, belief: Belief, time_s: float) -> None:
         """Begin, or begin again, with a belief about this frame."""
-        covariance = np.linalg.inv(belief.information)
+        covariance = _inverse(belief.information)
         lasting = _LASTING_SHARE * covariance
         self._now = Estimate(belief.state, covariance, lasting)
         self._now_s = self._observed_s = time_s
@@ -122,9 +122,9 @@ class PoseFilter:
         """
         assert self._key is not None and self._now is not None, "predicted first"
         fresh = min(max((self._now_s - self._observed_s) / _SAME_S, 0.0), 1.0)
-        before = np.linalg.inv(self._now.covariance)
+        before = _inverse(self._now.covariance)
         pull = (before + information) @ state.change_from(self._now.state)
-        covariance = np.linalg.inv(before + fresh * information)
+        covariance = _inverse(before + fresh * information)
         change = fresh * (covariance @ pull)
         gain = self._key.covariance @ self._by_key.T @ before
         key_covariance = self._key.covariance + gain @ (covariance - self._now.covariance) @ gain.T
@@ -149,7 +149,7 @@ class PoseFilter:
             [0.0] * 6 + [1.0] * 3
         )
         try:
-            lasting = _LASTING_SHARE * np.linalg.inv(alone + 1e-6 * before)
+            lasting = _LASTING_SHARE * _inverse(alone + 1e-6 * before)
         except np.linalg.LinAlgError:
             return None
         trace = _spread_m2(lasting)
@@ -166,6 +166,10 @@ class PoseFilter:
         sigma = np.array([_FLIGHT_RADPS] * 3 + [_FLIGHT_MPS] * 3 + [0.0] * 3) * seconds
         covariance = self._now.covariance + np.diag(sigma**2)
         self._now = Estimate(self._now.state, covariance, self._now.lasting)
+
+
+def _inverse(matrix: FloatArray) -> FloatArray:
+    return np.asarray(np.linalg.inv(matrix), dtype=np.float64)
 
 
 def _spread_m2(covariance: FloatArray) -> float:

@@ -137,7 +137,7 @@ def _step(samples: EdgeSamples, looks: Looks, state: SolidState, prior: Belief, 
         return None
     information, pull = _normal_equations(samples, jacobian, residual, weight, scatter_px)
     pull -= prior.information @ state.change_from(prior.state)
-    change = np.linalg.solve(information + prior.information, pull)
+    change = np.asarray(np.linalg.solve(information + prior.information, pull), dtype=np.float64)
     return change if np.isfinite(change).all() else None
 
 

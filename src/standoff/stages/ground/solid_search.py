@@ -257,7 +257,7 @@ def _score(picture: Blurred, shape: ReferenceShape, state: SolidState, box: Floa
     roll, _ = _roll_and_pitch(state.view)
     top_px = _top_px(state, shape)
     unlikely = _ROLL_COST * (roll / _ROLL_SIGMA_RAD) ** 2 + _outside_share(top_px, box) + _patchy_share(picture, top_px)
-    return top + lower - unlikely * float(length[:corners].sum())
+    return float(top + lower - unlikely * length[:corners].sum())
 
 
 def _patchy_share(picture: Blurred, top_px: FloatArray) -> float:
