@@ -10,6 +10,8 @@ from standoff.stages.ground.marker_place import MarkerPlace
 from standoff.stages.ground.markers import Markers, find_markers
 from standoff.stages.ground.observation import PointObservation
 from standoff.stages.ground.params import ReferenceParams
+from standoff.stages.ground.point_fit import belief_from_points, fit_points
+from standoff.stages.ground.pose_map import map_from_view
 from standoff.stages.ground.reference import ReferenceGround
 from standoff.stages.ground.shape import ReferenceShape
 from standoff.stages.ground.survey_file import load_survey
@@ -35,12 +37,15 @@ __all__ = [
     "SurveyedGround",
     "TelemetryPose",
     "Unmapped",
+    "belief_from_points",
     "calibrate",
     "calibrate_views",
     "find_corners",
     "find_markers",
+    "fit_points",
     "load_camera",
     "load_survey",
+    "map_from_view",
     "marker_pattern",
     "read_boards",
     "save_camera",
