@@ -9,7 +9,7 @@ import numpy as np
 from standoff.core import homography
 from standoff.core.camera import Camera
 from standoff.core.homography import FloatArray
-from standoff.core.pose import CHANGES, LENS, POSE, View
+from standoff.core.pose import LENS, POSE, View
 from standoff.core.types import CameraMotion
 from standoff.stages.ground.solid import STATE
 

@@ -13,6 +13,7 @@ from standoff.core.errors import GroundError
 from standoff.core.homography import FloatArray
 from standoff.core.pose import CHANGES
 from standoff.core.types import CameraMotion, Detections, Frame, GroundMap, ImageArray, NoCameraMotion, NoGroundMap
+from standoff.stages.ground.basis import BETTER_REFERENCE, lens_text, reference_basis
 from standoff.stages.ground.params import ReferenceParams
 from standoff.stages.ground.pose_filter import PoseFilter
 from standoff.stages.ground.pose_map import map_from_view
@@ -88,6 +89,8 @@ class FusedGround:
         camera = self._camera if self._camera is not None else self._given_camera
         return {
             "method": self._method,
+            "basis": f"{reference_basis(self._shape)}, {lens_text(camera)}",
+            "better": BETTER_REFERENCE,
             "corners_m": self._shape.corners_m.tolist(),
             "height_m": self._given_height_m,
             "params": asdict(self._params),
