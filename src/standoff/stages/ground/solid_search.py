@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import combinations
 
 import cv2
 import numpy as np
@@ -23,7 +24,7 @@ from standoff.stages.ground.outline import BOX_OUTSIDE, TOO_FEW_EDGES, undistort
 from standoff.stages.ground.point_fit import views_of_plane
 from standoff.stages.ground.quadrilateral import NO_QUADRILATERAL, ORDERS
 from standoff.stages.ground.shape import ReferenceShape
-from standoff.stages.ground.solid import HEIGHT, STATE, SolidState
+from standoff.stages.ground.solid import HEIGHT, STATE, SolidState, facing_sides
 from standoff.stages.ground.solid_edges import Blurred
 from standoff.stages.ground.solid_fit import Belief, SolidFit, fit_solid, outline_support
 
@@ -31,7 +32,7 @@ AMBIGUOUS = "the reference could lie in two ways"
 NOT_THERE = "no solid of the reference's shape fits the edges in its box"
 
 _MIN_EDGES = 16
-_QUADRILATERALS = 24
+_QUADRILATERALS, _MIXED = 24, 6
 _MARGIN = 0.12
 """The search goes this share of the box's longer side beyond the box: detectors cut corners."""
 
@@ -138,6 +139,10 @@ def _search(
     if not states:
         return NoGroundMap(NO_QUADRILATERAL)
     scores = np.array([_score(picture, shape, state, box) for state in states])
+    leading = [states[k] for k in np.argsort(-scores, kind="stable")[:_MIXED]]
+    mixed = [other for state in leading for other in _mixed(state, shape, camera.camera)]
+    states += mixed
+    scores = np.concatenate([scores, [_score(picture, shape, state, box) for state in mixed]])
     fits: list[tuple[float, Found]] = []
     for k in np.argsort(-scores, kind="stable")[: _REFINED * len(height.tried_m)]:
         if len(fits) == _REFINED:
@@ -145,7 +150,7 @@ def _search(
         prior = _prior(states[k], camera, height)
         fit = fit_solid(gray, shape, prior, _FIT_PX, start=states[k])
         if fit is not None and _believable(fit, shape):
-            score = _score(picture, shape, fit.state, box)
+            score = _score_of(fit.support, fit.length_px, picture, shape, fit.state, box)
             if score > 0:
                 fits.append((score, Found(fit, prior)))
     return _best(fits, shape)
@@ -219,6 +224,26 @@ def _states(outline: FloatArray, shape: ReferenceShape, camera: Camera, height: 
                     yield SolidState(lifted, height_m)
 
 
+def _mixed(state: SolidState, shape: ReferenceShape, camera: Camera) -> Iterator[SolidState]:
+    """Give the states in which some sides of an outline taken for the top's were the lower edges of these sides."""
+    straight = View(camera, state.view.position_m, state.view.site_to_camera)
+    count = len(shape.corners_m)
+    top_px = straight.project_pinhole(np.column_stack([shape.corners_m, np.full(count, state.height_m)]))
+    base_px = straight.project_pinhole(np.column_stack([shape.corners_m, np.zeros(count)]))
+    facing = np.flatnonzero(facing_sides(shape, straight))
+    if not np.isfinite(top_px).all() or not np.isfinite(base_px).all():
+        return
+    for size in range(1, len(facing) + 1):
+        for lower in combinations(facing.tolist(), size):
+            ends = sorted({corner for side in lower for corner in (side, (side + 1) % count)})
+            corners_px = top_px.copy()
+            corners_px[ends] += top_px[ends] - base_px[ends]
+            limit_px = max(_REPROJECTION_PX, _REPROJECTION_SHARE * float(np.linalg.norm(top_px[1] - top_px[0])))
+            for view in _views(corners_px, shape, camera, limit_px):
+                lifted = View(camera, view.position_m + np.array([0.0, 0.0, state.height_m]), view.site_to_camera)
+                yield SolidState(lifted, state.height_m)
+
+
 def _views(corners_px: FloatArray, shape: ReferenceShape, camera: Camera, limit_px: float) -> Iterator[View]:
     """Give the views from above, nearly level, from which the shape at z = 0 has these corners."""
     for view in views_of_plane(corners_px, shape.corners_m, camera, limit_px):
@@ -237,10 +262,30 @@ def _roll_and_pitch(view: View) -> tuple[float, float]:
 
 
 def _score(picture: Blurred, shape: ReferenceShape, state: SolidState, box: FloatArray) -> float:
-    """Return px of outline that the picture has, less what is bare of the top, less what is unlikely."""
+    """Return px of outline that the picture has where a state puts it, as `_score_of`."""
     samples, support = outline_support(picture, shape, state)
+    return _score_of(support, samples.length_px, picture, shape, state, box)
+
+
+def _score_of(
+    support: FloatArray,
+    length: FloatArray,
+    picture: Blurred,
+    shape: ReferenceShape,
+    state: SolidState,
+    box: FloatArray,
+) -> float:
+    """Return px of outline that the picture has, less what is bare of the top, less what is unlikely.
+
+    Args:
+        support: (E,) share of each visible edge that the picture has.
+        length: (E,) of each, px.
+        picture: Around the reference.
+        shape: Its.
+        state: Where it is.
+        box: (4,) where it was detected.
+    """
     support = np.nan_to_num(support, nan=0.0)
-    length = samples.length_px
     corners = len(shape.corners_m)
     top = float((length[:corners] * (support[:corners] - _BARE_COST)).sum())
     lower = float((length[corners:] * np.maximum(support[corners:] - _BARE_COST, 0.0)).sum())
