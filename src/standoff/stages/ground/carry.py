@@ -9,7 +9,7 @@ import numpy as np
 from standoff.core import homography
 from standoff.core.camera import Camera
 from standoff.core.homography import FloatArray
-from standoff.core.pose import CHANGES, LENS, POSE, View
+from standoff.core.pose import LENS, POSE, View
 from standoff.core.types import CameraMotion
 from standoff.stages.ground.solid import STATE
 
@@ -37,6 +37,19 @@ class Carried:
     added: FloatArray
 
 
+def since(earlier: CameraMotion, later: CameraMotion) -> CameraMotion:
+    """Return the motion from one frame to a later one, both known since the same keyframe.
+
+    The errors of both count in full, though they have causes in common: it is rather too large.
+    """
+    back = homography.invert(earlier.keyframe_to_image)
+    step = later.keyframe_to_image @ back
+    by_later, by_earlier = np.kron(np.eye(3), back.T), -np.kron(step, back.T)
+    covariance = by_later @ later.covariance @ by_later.T + by_earlier @ earlier.covariance @ by_earlier.T
+    norm = np.linalg.norm(step)
+    return CameraMotion(step / norm, covariance / norm**2, earlier.keyframe_s, later.camera, later.repeated)
+
+
 def carry(key: View, motion: CameraMotion, guess: View) -> Carried | None:
     """Find where the camera is after the picture of the ground has moved.
 
@@ -62,8 +75,9 @@ def carry(key: View, motion: CameraMotion, guess: View) -> Carried | None:
         misfit = (moved_px - points_px).ravel()
         if not np.isfinite(misfit).all():
             return None
-        change = np.zeros(CHANGES)
-        change[POSE] = np.linalg.lstsq(by_view[:, :, POSE].reshape(-1, 6), misfit, rcond=None)[0]
+        pose = by_view[:, :, POSE].reshape(-1, 6)
+        change = np.zeros(8)
+        change[POSE] = np.linalg.pinv(pose) @ misfit
         now = now.changed(change)
         if np.abs(change).max() < 1e-7:
             break

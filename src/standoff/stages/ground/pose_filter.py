@@ -14,13 +14,19 @@ import numpy as np
 from standoff.core.homography import FloatArray
 from standoff.core.pose import POSE
 from standoff.core.types import CameraMotion, NoCameraMotion
-from standoff.stages.ground.carry import carry
-from standoff.stages.ground.solid import STATE, SolidState
+from standoff.stages.ground.carry import carry, since
+from standoff.stages.ground.solid import HEIGHT, STATE, SolidState
 from standoff.stages.ground.solid_fit import Belief
 
-_SAME_S = 0.5
-_LASTING_SHARE = 0.3
+_SAME_S, _SAME_UNSURE_S = 0.5, 4.0
+"""The second while the lens is unsure: errors of edges are then taken for the lens's, the same in each frame."""
+
+_LASTING_SHARE, _LASTING_UNSURE_SHARE = 0.3, 1.0
 """Of one observation's variance so much is there in each and never averages out."""
+
+_SURE_FOCAL_SIGMA = 0.02
+_GUESSED_HEIGHT_SIGMA_M = 0.12
+"""A height read off the picture may be that of a shadow's edge: it is never surer than this."""
 
 _FLIGHT_MPS, _FLIGHT_RADPS = 5.0, 0.6
 """How fast a drone may move and turn while nothing tells how."""
@@ -61,8 +67,12 @@ class PoseFilter:
         self._now: Estimate | None = None
         self._now_s = 0.0
         self._by_key = np.eye(STATE)
+        self._motion: CameraMotion | NoCameraMotion = NoCameraMotion("not yet")
+        self._key_motion: CameraMotion | NoCameraMotion = self._motion
         self._observed_s = -np.inf
         self._lasting_trace = np.inf
+        self._same_s, self._lasting_share = _SAME_S, _LASTING_SHARE
+        self._height_doubt_m2 = np.zeros((STATE, STATE))
 
     @property
     def now(self) -> Estimate | None:
@@ -74,10 +84,19 @@ class PoseFilter:
         """When an observation was last taken in; minus infinity before the first."""
         return self._observed_s
 
-    def start(self, belief: Belief, time_s: float) -> None:
-        """Begin, or begin again, with a belief about this frame."""
+    def start(self, belief: Belief, time_s: float, *, height_known: bool = True) -> None:
+        """Begin, or begin again, with a belief about this frame; say whether the height was measured by hand."""
         covariance = _inverse(belief.information)
-        lasting = _LASTING_SHARE * covariance
+        lens_sure = covariance[6, 6] < _SURE_FOCAL_SIGMA**2
+        self._height_doubt_m2 = np.zeros((STATE, STATE))
+        if not height_known:
+            # The top is where it is seen: a higher solid puts the ground lower and the camera higher above it.
+            together = np.zeros(STATE)
+            together[[5, HEIGHT]] = _GUESSED_HEIGHT_SIGMA_M
+            self._height_doubt_m2 = np.outer(together, together)
+        self._same_s = _SAME_S if lens_sure else _SAME_UNSURE_S
+        self._lasting_share = _LASTING_SHARE if lens_sure else _LASTING_UNSURE_SHARE
+        lasting = self._lasting_share * covariance + self._height_doubt_m2
         self._now = Estimate(belief.state, covariance, lasting)
         self._now_s = self._observed_s = time_s
         self._lasting_trace = _spread_m2(lasting)
@@ -90,15 +109,11 @@ class PoseFilter:
             Whether motion carried it; if not, all that is known is that a drone flies so fast at most.
         """
         if self._key is None or self._now is None:
+            self._motion = motion
             return False
-        carried = None
-        if isinstance(motion, CameraMotion):
-            if abs(motion.keyframe_s - self._key_s) > _TIME_SLACK_S and (
-                abs(motion.keyframe_s - self._now_s) <= _TIME_SLACK_S
-            ):
-                self._rekey()
-            if abs(motion.keyframe_s - self._key_s) <= _TIME_SLACK_S:
-                carried = carry(self._key.state.view, motion, self._now.state.view)
+        since_key = self._since_key(motion)
+        carried = None if since_key is None else carry(self._key.state.view, since_key, self._now.state.view)
+        self._motion = motion
         if carried is None:
             self._drift(max(time_s - self._now_s, 0.0))
             self._now_s = time_s
@@ -121,7 +136,7 @@ class PoseFilter:
             information: (9, 9) that the observation adds at full weight.
         """
         assert self._key is not None and self._now is not None, "predicted first"
-        fresh = min(max((self._now_s - self._observed_s) / _SAME_S, 0.0), 1.0)
+        fresh = min(max((self._now_s - self._observed_s) / self._same_s, 0.0), 1.0)
         before = _inverse(self._now.covariance)
         pull = (before + information) @ state.change_from(self._now.state)
         covariance = _inverse(before + fresh * information)
@@ -149,7 +164,7 @@ class PoseFilter:
             [0.0] * 6 + [1.0] * 3
         )
         try:
-            lasting = _LASTING_SHARE * _inverse(alone + 1e-6 * before)
+            lasting = self._lasting_share * np.linalg.inv(alone + 1e-6 * before) + self._height_doubt_m2
         except np.linalg.LinAlgError:
             return None
         trace = _spread_m2(lasting)
@@ -158,8 +173,21 @@ class PoseFilter:
         self._lasting_trace = trace
         return lasting
 
+    def _since_key(self, motion: CameraMotion | NoCameraMotion) -> CameraMotion | None:
+        """Return the motion since the frame at which the belief is held, which need not be the motion's keyframe."""
+        if isinstance(motion, NoCameraMotion):
+            return None
+        if _same_time(motion.keyframe_s, self._now_s) and not _same_time(self._key_s, self._now_s):
+            self._rekey()
+        if _same_time(motion.keyframe_s, self._key_s):
+            return motion
+        if isinstance(self._key_motion, CameraMotion) and _same_time(motion.keyframe_s, self._key_motion.keyframe_s):
+            return since(self._key_motion, motion)
+        return None
+
     def _rekey(self) -> None:
-        self._key, self._key_s, self._by_key = self._now, self._now_s, np.eye(STATE)
+        self._key, self._key_s, self._key_motion = self._now, self._now_s, self._motion
+        self._by_key = np.eye(STATE)
 
     def _drift(self, seconds: float) -> None:
         assert self._now is not None
@@ -170,6 +198,10 @@ class PoseFilter:
 
 def _inverse(matrix: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.inv(matrix), dtype=np.float64)
+
+
+def _same_time(first_s: float, second_s: float) -> bool:
+    return abs(first_s - second_s) <= _TIME_SLACK_S
 
 
 def _spread_m2(covariance: FloatArray) -> float:
