@@ -129,7 +129,7 @@ def _paint(grey: FloatArray, view: View, faces: list[tuple[FloatArray, float]]) 
     right, bottom = np.minimum(np.ceil(around.max(axis=0)).astype(int) + _MARGIN_PX, (width, height))
     columns, rows = np.meshgrid(np.arange(left, right), np.arange(top, bottom))
     rays = view.camera.undistort(np.column_stack([columns.ravel(), rows.ravel()])).reshape(*columns.shape, 2)
-    down, across = np.gradient(rays, axis=(0, 1))
+    down, across = np.gradient(rays, axis=0), np.gradient(rays, axis=1)
     steps = (np.arange(_SUBPIXELS) + 0.5) / _SUBPIXELS - 0.5
     for polygon, shade in faces:
         corners = view.project_pinhole(polygon)

@@ -125,7 +125,8 @@ def test_maps_that_no_camera_above_the_ground_has_are_refused() -> None:
 
 def _change(seed: int) -> FloatArray:
     rng = np.random.default_rng(seed)
-    return rng.normal(size=CHANGES) * np.array([0.3] * 3 + [5.0] * 3 + [0.2, 0.02])
+    change: FloatArray = rng.normal(size=CHANGES) * np.array([0.3] * 3 + [5.0] * 3 + [0.2, 0.02])
+    return change
 
 
 @examples(30)

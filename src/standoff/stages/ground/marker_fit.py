@@ -66,7 +66,7 @@ def fit_points(
         residual, by_change, _ = rows
         normal = by_change.T @ by_change
         damped = normal + damping * np.diag(np.diag(normal) + 1e-12)
-        change: FloatArray = -np.linalg.solve(damped, by_change.T @ residual)
+        change = -np.asarray(np.linalg.solve(damped, by_change.T @ residual), dtype=np.float64)
         trial = view.changed(change)
         tried = _rows(trial, seen, prior, place_sigma_m)
         if tried is None or tried[0] @ tried[0] > residual @ residual * (1.0 + 1e-12) + 1e-12:
@@ -83,7 +83,7 @@ def fit_points(
     residual, by_change, of_points = rows
     information = of_points.T @ of_points
     try:
-        covariance: FloatArray = np.linalg.inv(by_change.T @ by_change)
+        covariance = np.asarray(np.linalg.inv(by_change.T @ by_change), dtype=np.float64)
     except np.linalg.LinAlgError:
         return None
     return PointFit(view, information, covariance, float(residual @ residual), tuple(seen))

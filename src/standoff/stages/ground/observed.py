@@ -227,7 +227,7 @@ class ObservedGround:
         assert now is not None
         view, total = now.state.view, now.total[:CHANGES, :CHANGES]
         believed = agreeing(view, total, seen, self._place_sigma_m)
-        before: FloatArray = np.linalg.inv(now.covariance)
+        before = np.asarray(np.linalg.inv(now.covariance), dtype=np.float64)
         prior = carried_prior(view, before[:CHANGES, :CHANGES])
         fit = fit_points(view, believed, prior, self._place_sigma_m) if believed else None
         if fit is None:

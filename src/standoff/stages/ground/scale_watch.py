@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from standoff.core.camera import CameraPrior
-from standoff.core.classes import CLASSES, Role
+from standoff.core.classes import Role, class_ids
 from standoff.core.errors import GroundError
 from standoff.core.protocols import AnyGround, AnyMotion, Ground
 from standoff.core.types import Detections, Frame, GroundMap, NoGroundMap
-from standoff.stages.ground.size_scale import REFUSAL_FACTOR, WARNING_FACTOR, scale_from_sizes, unit_hint
+from standoff.stages.ground.size_scale import REFUSAL_FACTOR, WARNING_FACTOR, size_ratios, unit_hint
 
 _EVERY_S = 0.5
 _LEAST_SCORE = 0.6
@@ -94,29 +94,18 @@ class ScaleWatch:
         return ground
 
     def _take(self, ground: GroundMap, detections: Detections) -> None:
+        sure = detections[detections.score >= _LEAST_SCORE]
+        try:
+            log_ratio, sigma = size_ratios(ground, sure.xyxy_px, sure.class_id, self._camera)
+        except GroundError:
+            # A map that is no camera's has no sizes of upright things; its own stage says so.
+            return
         for name, role in _GROUPS.items():
-            ids = [kind.id for kind in CLASSES if kind.role is role]
-            sure = (detections.score >= _LEAST_SCORE) & np.isin(detections.class_id, ids)
-            logs, sigmas = self._compared(ground, detections[sure])
+            mine = np.isin(sure.class_id, class_ids(role)) & np.isfinite(log_ratio)
             sizes = self._sizes[name]
-            sizes.logs.extend(logs)
-            sizes.sigmas.extend(sigmas)
-            sizes.at_once = max(sizes.at_once, len(logs))
-
-    def _compared(self, ground: GroundMap, boxes: Detections) -> tuple[list[float], list[float]]:
-        logs, sigmas = [], []
-        for row in range(len(boxes)):
-            try:
-                scale = scale_from_sizes(
-                    ground, boxes.xyxy_px[row : row + 1], boxes.class_id[row : row + 1], camera=self._camera
-                )
-            except GroundError:
-                # A map that is no camera's has no sizes of upright things; its own stage says so.
-                return [], []
-            if scale is not None:
-                logs.append(float(np.log(scale.ratio)))
-                sigmas.append(scale.sigma)
-        return logs, sigmas
+            sizes.logs.extend(log_ratio[mine].tolist())
+            sizes.sigmas.extend(sigma[mine].tolist())
+            sizes.at_once = max(sizes.at_once, int(mine.sum()))
 
     def _judge(self) -> None:
         log_factor, seen, at_once, names = self._agreed()

@@ -83,7 +83,7 @@ def _heading(view: View) -> float:
 
 def carried_prior(view: View, information: FloatArray) -> PriorRows:
     """Return the rows of a belief (8, 8) in one view."""
-    root: FloatArray = np.linalg.cholesky((information + information.T) / 2.0).T
+    root = np.asarray(np.linalg.cholesky((information + information.T) / 2.0).T, dtype=np.float64)
 
     def rows(now: View) -> tuple[FloatArray, FloatArray]:
         return root @ now.change_from(view), root
@@ -93,7 +93,7 @@ def carried_prior(view: View, information: FloatArray) -> PriorRows:
 
 def telemetry_prior(telemetry: View, covariance: FloatArray) -> PriorRows:
     """Return the rows of a telemetry whose place and heading are of another site frame than the view's."""
-    root: FloatArray = np.linalg.cholesky(np.linalg.inv(covariance)).T
+    root = np.asarray(np.linalg.cholesky(np.linalg.inv(covariance)).T, dtype=np.float64)
 
     def rows(now: View) -> tuple[FloatArray, FloatArray]:
         return root @ now.change_from(in_frame_of(telemetry, now)), root
