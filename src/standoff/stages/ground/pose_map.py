@@ -8,8 +8,6 @@ from standoff.core.homography import FloatArray, invert, point_jacobian
 from standoff.core.pose import CHANGES, View
 from standoff.core.types import GroundMap
 
-_STEP = np.array([1e-5] * 3 + [1e-4] * 3 + [1e-5] * 2)
-
 
 def map_from_view(
     view: View,
@@ -34,15 +32,8 @@ def map_from_view(
         size_sigma: Standard error of all lengths at once, as a share of them: of the tape measure.
         middle_m: (2,) the place that such an error leaves where it is; None: the origin.
     """
-    entries = _entries(view)
-    by_view = np.zeros((10, CHANGES))
-    for k in range(CHANGES):
-        step = np.zeros(CHANGES)
-        step[k] = _STEP[k]
-        by_view[:9, k] = (_entries(view.changed(step)) - _entries(view.changed(-step))) / (2.0 * _STEP[k])
-    by_view[9, 7] = 1.0
+    matrix, by_view = _entries_with_jacobian(view)
     total = by_view @ covariance @ by_view.T
-    matrix = entries.reshape(3, 3)
     if size_sigma > 0:
         middle = np.zeros(2) if middle_m is None else middle_m
         stretch = np.zeros((3, 3))
@@ -61,43 +52,26 @@ def map_from_view(
     )
 
 
-def _entries(view: View) -> FloatArray:
-    """Return the nine entries of the signed map from undistorted pixels to the ground, at unit norm."""
-    matrix = invert(view.plane_to_pinhole())
-    entries: FloatArray = (matrix / np.linalg.norm(matrix)).ravel()
-    return entries
-
-
-_AT = np.array([[0.45, 0.6], [0.55, 0.6], [0.5, 0.52], [0.5, 0.68]])
-"""Ends of a stretch of ground to the side and of one away from the camera, as shares of the picture."""
-
-
-def length_sigma(view: View, covariance: FloatArray) -> float:
-    """Return the relative standard error of lengths in the middle of the picture, in the worse direction.
-
-    Args:
-        view: The camera.
-        covariance: (8, 8) of a change of the view.
+def _entries_with_jacobian(view: View) -> tuple[FloatArray, FloatArray]:
+    """Return the signed map from undistorted pixels to the ground, at unit norm, and its derivative by the view.
 
     Returns:
-        Infinite where no ground is seen there.
+        (3, 3), and (10, 8) of its entries and of the lens's k1.
     """
-    points_m = np.column_stack([view.to_plane(_AT * [view.camera.width_px, view.camera.height_px]), np.zeros(len(_AT))])
-    if not np.isfinite(points_m).all():
-        return np.inf
-    _, by_view, by_point = view.project_with_jacobians(points_m)
-    # A pixel stays where it is, so its place on the ground moves.
-    by_change = -np.linalg.solve(by_point[:, :, :2], by_view)
-    worst = 0.0
-    for start, end in ((0, 1), (2, 3)):
-        apart_m = (points_m[end] - points_m[start])[:2]
-        longer = apart_m @ (by_change[end] - by_change[start]) / (apart_m @ apart_m)
-        worst = max(worst, float(longer @ covariance @ longer))
-    return float(np.sqrt(worst))
-
-
-def middle_scale_m_per_px(view: View) -> float:
-    """Return metres per undistorted pixel a little below the middle of the picture; NaN if no ground is seen there."""
-    point_px = view.camera.undistort(np.array([[view.camera.width_px * 0.5, view.camera.height_px * 0.6]]))
-    jacobian = point_jacobian(invert(view.plane_to_pinhole()), point_px)[0]
-    return float(np.sqrt(abs(np.linalg.det(jacobian))))
+    forth = view.plane_to_pinhole()
+    back = invert(forth)
+    camera = view.camera.matrix
+    to_camera = np.linalg.solve(camera, forth)
+    by_forth = np.zeros((CHANGES, 3, 3))
+    for k, axis in enumerate(np.eye(3)):
+        by_forth[k] = camera @ np.cross(axis, to_camera, axisb=0).T
+        by_forth[3 + k, :, 2] = -camera @ view.site_to_camera[:, k]
+    by_forth[6, :2] = np.diag(camera)[:2, None] * to_camera[:2]
+    # The inverse moves by -back d(forth) back; of that only what is across the entries' own direction keeps the norm.
+    slopes = -(back @ by_forth @ back).reshape(CHANGES, 9)
+    norm = float(np.linalg.norm(back))
+    entries = (back / norm).ravel()
+    by_view = np.zeros((10, CHANGES))
+    by_view[:9] = (slopes - np.outer(slopes @ entries, entries)).T / norm
+    by_view[9, 7] = 1.0
+    return entries.reshape(3, 3), by_view
