@@ -45,7 +45,7 @@ class MappedPoints:
         """
         jacobian = map_jacobian(ground, ground.undistorted(points_px))
         xy_m, _ = ground.to_ground(points_px)
-        covariance_m2 = jacobian @ ground.covariance[:9, :9] @ jacobian.transpose(0, 2, 1)
+        covariance_m2 = jacobian @ ground.covariance @ jacobian.transpose(0, 2, 1)
         self.xy_m[frame] = turning.to_site(xy_m, turn)
         self.covariance_m2[frame] = turning.covariance_to_site(covariance_m2, turn)
 
