@@ -25,8 +25,8 @@ CHANGES = 8
 TURN, SHIFT, POSE, LENS = slice(0, 3), slice(3, 6), slice(0, 6), slice(6, 8)
 """Their places in a change."""
 
-_MAX_SKEW = 1e-5
-"""A rotation's axes may miss being unit vectors at right angles by so much: matrices are read from files."""
+_MAX_SKEW = np.eye(3) * 1e-5 + 1e-9
+"""A rotation's axes may miss being unit vectors by so much, and right angles hardly: matrices are read from files."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,8 +48,8 @@ class View:
         rotation = np.array(self.site_to_camera, dtype=np.float64)
         if position.shape != (3,) or rotation.shape != (3, 3):
             raise ValueError(f"position must be (3,), rotation (3, 3), not {position.shape} and {rotation.shape}")
-        askew = np.abs(rotation @ rotation.T - np.eye(3)).max()
-        if not askew <= _MAX_SKEW or np.linalg.det(rotation) < 0:
+        askew = np.abs(rotation @ rotation.T - np.eye(3))
+        if not (askew <= _MAX_SKEW).all() or np.linalg.det(rotation) < 0:
             raise ValueError("site_to_camera must be a rotation")
         position.setflags(write=False)
         rotation.setflags(write=False)
