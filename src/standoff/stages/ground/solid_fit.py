@@ -254,9 +254,13 @@ def _associated(
 
 def _medians(residual: FloatArray, found: BoolArray, samples: EdgeSamples) -> FloatArray:
     """Return (E,) the median residual of each edge; 0 where nothing was found."""
-    medians = np.zeros(len(samples.length_px))
-    for edge in np.unique(samples.edge[found]):
-        medians[edge] = np.median(residual[found & (samples.edge == edge)])
+    edge, residual = samples.edge[found], residual[found]
+    ordered = residual[np.lexsort((residual, edge))]
+    counts = np.bincount(edge, minlength=len(samples.length_px))
+    there = np.flatnonzero(counts)
+    first = (np.cumsum(counts) - counts)[there]
+    medians = np.zeros(len(counts))
+    medians[there] = (ordered[first + (counts[there] - 1) // 2] + ordered[first + counts[there] // 2]) / 2.0
     return medians
 
 
