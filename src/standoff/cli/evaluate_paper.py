@@ -25,9 +25,9 @@ def paper(
     clips: Annotated[
         list[Path] | None, typer.Argument(help="Folders that `standoff simulate` wrote.", show_default=False)
     ] = None,
-    method: Annotated[Method, typer.Option(help="How the reference is found; `fused` is standoff's default, `paper` as printed.")] = (
-        "paper"
-    ),
+    method: Annotated[
+        Method, typer.Option(help="How the reference is found; `fused` is standoff's default, `paper` as printed.")
+    ] = ("paper"),
     detector: Annotated[
         str,
         typer.Option(

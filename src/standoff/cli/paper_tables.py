@@ -131,7 +131,10 @@ def _print_pooled(results: Sequence[ClipResult]) -> None:
         (label, *(_with_interval(name, getattr(of, name), pooled.intervals[f"{kind} {name}"]) for kind, of in kinds))
         for name, label in _LONG.items()
     ]
-    for name, label in (("without_map_share", "frames without a map, %"), ("without_map_since_seen_share", "the same once seen, %")):
+    for name, label in (
+        ("without_map_share", "frames without a map, %"),
+        ("without_map_since_seen_share", "the same once seen, %"),
+    ):
         share = _with_interval(name, getattr(pooled, name), pooled.intervals[name])
         rows.append((label, share, ""))
     caption = "In brackets: 95 % of a bootstrap over the clips."

@@ -21,7 +21,6 @@ from standoff.stages.ground import ReferenceShape
 from standoff.stages.ground.params import ReferenceMethod
 from standoff.stages.locate.params import Anchor, LocateParams
 
-
 CameraKnowledge = Literal["file", "unknown"]
 HeightKnowledge = Literal["known", "unknown"]
 
