@@ -21,7 +21,6 @@ from standoff.core.types import ImageArray, NoGroundMap
 from standoff.stages.ground.edges import between_pixels, canny, sobel_gradients
 from standoff.stages.ground.oriented import likely_quadrilaterals, noise_thresholds
 from standoff.stages.ground.outline import BOX_OUTSIDE, TOO_FEW_EDGES, undistorted_box
-from standoff.stages.ground.point_fit import views_of_plane
 from standoff.stages.ground.quadrilateral import NO_QUADRILATERAL, ORDERS
 from standoff.stages.ground.shape import ReferenceShape
 from standoff.stages.ground.solid import HEIGHT, STATE, SolidState, facing_sides
@@ -246,9 +245,20 @@ def _mixed(state: SolidState, shape: ReferenceShape, camera: Camera) -> Iterator
 
 def _views(corners_px: FloatArray, shape: ReferenceShape, camera: Camera, limit_px: float) -> Iterator[View]:
     """Give the views from above, nearly level, from which the shape at z = 0 has these corners."""
-    for view in views_of_plane(corners_px, shape.corners_m, camera, limit_px):
+    places = np.column_stack([shape.corners_m, np.zeros(len(shape.corners_m))])
+    middle = places.mean(axis=0)
+    found, turns, shifts, errors = cv2.solvePnPGeneric(
+        places - middle, corners_px[:, None], camera.matrix, None, flags=cv2.SOLVEPNP_IPPE
+    )
+    for k in range(found):
+        if float(np.ravel(errors[k])[0]) > limit_px:
+            continue
+        rotation = cv2.Rodrigues(turns[k])[0]
+        left, _, right = np.linalg.svd(rotation)
+        rotation = left @ right
+        view = View(camera, middle - rotation.T @ shifts[k].ravel(), rotation)
         roll, pitch = _roll_and_pitch(view)
-        if abs(roll) < _MAX_ROLL_RAD and pitch > _MIN_PITCH_RAD:
+        if view.position_m[2] > 0 and abs(roll) < _MAX_ROLL_RAD and pitch > _MIN_PITCH_RAD:
             yield view
 
 
