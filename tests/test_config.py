@@ -8,7 +8,7 @@ import yaml
 from standoff.config import Settings, build_ground, build_pipeline, load_settings, resolved
 from standoff.core.errors import ConfigError, GroundError
 from standoff.core.types import Detections, Frame
-from standoff.stages.ground import ReferenceGround, Unmapped
+from standoff.stages.ground import FusedGround, ObservedGround, ScaleWatch, Unmapped
 from standoff.stages.hazard import HazardMonitor
 
 
@@ -146,7 +146,7 @@ def test_a_replacement_that_does_not_take_its_options_is_one_line() -> None:
 )
 def test_a_reference_is_described_in_any_of_four_ways(reference: dict[str, object]) -> None:
     settings = load_settings(overrides={"ground": {"reference": reference}})
-    assert isinstance(build_ground(settings), ReferenceGround)
+    assert isinstance(_inner(settings), FusedGround)
 
 
 def test_a_shape_that_cannot_be_is_a_ground_error() -> None:
@@ -155,8 +155,20 @@ def test_a_shape_that_cannot_be_is_a_ground_error() -> None:
         build_ground(settings)
 
 
-def test_without_a_ground_every_frame_says_so() -> None:
-    assert isinstance(build_ground(Settings()), Unmapped)
+def _inner(settings: Settings) -> object:
+    ground = build_ground(settings)
+    assert isinstance(ground, ScaleWatch)
+    return ground.inner
+
+
+def test_without_a_ground_there_is_one_by_what_the_source_tells() -> None:
+    assert isinstance(_inner(Settings()), ObservedGround)
+
+
+def test_no_ground_at_all_has_to_be_asked_for() -> None:
+    assert isinstance(build_ground(load_settings(overrides={"ground": {"auto": False}})), Unmapped)
+    markers = {"auto": False, "markers": [{"size_m": 1.0}]}
+    assert isinstance(_inner(load_settings(overrides={"ground": markers})), ObservedGround)
 
 
 @pytest.mark.parametrize("example", ["paper.yaml", "pets2009/site.yaml"])

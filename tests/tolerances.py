@@ -143,3 +143,27 @@ of the priors on pitch and height, and a window of ten seconds."""
 SIZES_COVERED = 0.80
 """Mean share of distances inside 95 % intervals, 40 crowds; distances of one crowd are right or wrong together, so as
 40 trials of 0.91: 0.91 less 2.5 x 0.045."""
+
+DERIVATIVE_REL = 2e-6
+"""Central differences with steps of 1e-5: the third derivative, and the rounding of pixels of some thousand."""
+
+TURN_RAD = 1e-7
+"""There and back through a rotation's trace and sine: near half a circle the sine is small and its rounding grows."""
+
+SOLID_CHI2 = 9.0
+"""Mean of squares of errors of nine parameters, each by its standard error: 9 if those are right, less if too large."""
+
+SOLID_CHI2_LEAST = 1.5
+"""Measured: 3.3. Standard errors allow for stains, shading and compression, which drawn pictures do not have."""
+
+SOLID_PX = 0.7
+"""Corners of a drawn solid's top after a fit: 0.1 to 0.3 px where all edges are seen, more where few are."""
+
+CARRIED_PX = 1e-6
+"""A view that explains a motion of the plane exactly, after Newton's last step."""
+
+MAP_SIGMA_REL = 0.1
+"""As FIRST_ORDER_SIGMA_REL with small errors, which see hardly any curvature: 600 trials (2.9 %, three of those)."""
+
+SAME_MAP_M = 1e-6
+"""The same distances in two site frames: numerical derivatives and the order of sums."""

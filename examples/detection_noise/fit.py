@@ -163,17 +163,18 @@ def fit_odds(features: FloatArray, found: FloatArray) -> FloatArray:
     return np.asarray(minimize(loss, USUAL_FOUND, method="L-BFGS-B", bounds=limits).x)
 
 
-def fit_edges(edges: FloatArray, sides: FloatArray) -> tuple[FloatArray, float, float]:
-    """Return bias of each side, and the share and px of the rest: maximum likelihood, outliers cut at 4 sigma."""
+def fit_edges(edges: FloatArray, sides: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+    """Return bias and share of each edge, and px of all: maximum likelihood, outliers cut at 4 sigma."""
     bias = np.median(edges / sides, axis=0)
     rest = edges - bias * sides
 
     def loss(logs: FloatArray) -> float:
-        sigma = np.hypot(np.exp(logs[0]) * sides, np.exp(logs[1]))
+        sigma = np.hypot(np.exp(logs[:4]) * sides, np.exp(logs[4]))
         return float((np.log(sigma) + 0.5 * np.minimum((rest / sigma) ** 2, 16.0)).sum())
 
-    share, px = np.exp(minimize(loss, np.log([0.03, 1.0]), method="Nelder-Mead").x)
-    return bias, float(share), float(px)
+    start, limits = np.log([0.05] * 4 + [1.0]), [(np.log(0.003), np.log(0.5))] * 4 + [(np.log(0.2), np.log(8.0))]
+    logs = minimize(loss, start, method="L-BFGS-B", bounds=limits).x
+    return bias, np.exp(logs[:4]), float(np.exp(logs[4]))
 
 
 def fit_scores(features: FloatArray, logits: FloatArray) -> tuple[FloatArray, float]:
@@ -201,15 +202,15 @@ def memory_s(tracks: Tracks) -> float:
 
 def summarised(sample: Sample, frames: int, classes: int) -> ClassNoise:
     """Return the row of the table for one group."""
-    bias, share, px = fit_edges(np.array(sample.edges), np.array(sample.sides))
+    bias, shares, px = fit_edges(np.array(sample.edges), np.array(sample.sides))
     scores, sigma = fit_scores(np.array(sample.found_features), np.array(sample.logits))
     found = fit_odds(np.array(sample.features), np.array(sample.found, float))
     sizes, logits = np.array(sample.false_sizes), np.array(sample.false_logits)
     if len(sizes) < 3:
         sizes, logits = np.append(sizes, [0.0, 1.0, 2.0]), np.append(logits, [-2.0, -1.5, -1.0])
-    rounded = [tuple(np.round(part, 3).tolist()) for part in (found, bias, scores)]
+    rounded = [tuple(np.round(part, 3).tolist()) for part in (found, bias, shares, scores)]
     return ClassNoise(
-        rounded[0], rounded[1], round(share, 4), round(px, 2), rounded[2], round(sigma, 2),
+        rounded[0], rounded[1], rounded[2], round(px, 2), rounded[3], round(sigma, 2),
         round(max(len(sample.false_sizes), 0.5) / frames / classes, 4),
         (round(float(sizes.mean()), 2), round(float(sizes.std()), 2)),
         (round(float(logits.mean()), 2), round(float(logits.std()), 2)),

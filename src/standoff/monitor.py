@@ -8,7 +8,7 @@ for result in open_run("site.mp4", "out", load_settings(Path("site.yaml"))):
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -92,19 +92,30 @@ def open_run(source: Path | str, out: Path | str, settings: Settings, *, overwri
         "settings": resolved(settings),
         "source": frames.description,
         "model": getattr(pipeline.detector, "description", None),
-        "ground": getattr(pipeline.ground, "description", None),
-        "warnings": [*frames.warnings, *ground_warnings(pipeline.ground)],
+        **_ground_parts(frames, pipeline.ground),
     }
+
+    def at_close() -> dict[str, Any]:
+        """Return what is known of the ground, now that the frames have been seen."""
+        return _ground_parts(frames, pipeline.ground)
+
     extra = {name: build_replacement(name, replacement) for name, replacement in settings.extra_outputs.items()}
     folder = prepare_output(out, overwrite=overwrite)
-    own = build_sinks(settings, folder, descriptions)
+    own = build_sinks(settings, folder, descriptions, at_close)
     # The record last, so that it times all others.
-    pipeline.sinks = {**own, **extra, "record": RecordSink(folder / RECORD, descriptions)}
+    pipeline.sinks = {**own, **extra, "record": RecordSink(folder / RECORD, descriptions, at_close)}
     return Run(frames, pipeline, folder)
 
 
+def _ground_parts(source: Source, ground: Ground) -> dict[str, Any]:
+    return {
+        "ground": getattr(ground, "description", None),
+        "warnings": [*source.warnings, *ground_warnings(ground)],
+    }
+
+
 def ground_warnings(ground: Ground) -> list[str]:
-    """Return what a ground stage says of its own set-up: a survey point that disagrees, a mirrored frame."""
+    """Return what a ground stage says of its own set-up, and of its metres once it has seen frames."""
     return list(getattr(ground, "description", {}).get("warnings", ()))
 
 
@@ -116,8 +127,20 @@ def _refuse_to_replace(source: Path, out: Path, what: str) -> None:
         )
 
 
-def build_sinks(settings: Settings, folder: Path, descriptions: dict[str, Any]) -> dict[str, Sink]:
-    """Make the configured outputs of standoff's own, without the record."""
+def build_sinks(
+    settings: Settings,
+    folder: Path,
+    descriptions: dict[str, Any],
+    at_close: Callable[[], Mapping[str, Any]] | None = None,
+) -> dict[str, Sink]:
+    """Make the configured outputs of standoff's own, without the record.
+
+    Args:
+        settings: Of everything.
+        folder: Where they go.
+        descriptions: For the report.
+        at_close: Gives descriptions anew once the last frame has been seen.
+    """
     makers: dict[str, Any] = {
         "tracks": lambda: TableSink(folder / "tracks.parquet", TRACKS, settings.tables),
         "proximity": lambda: TableSink(folder / "proximity.parquet", PROXIMITY, settings.tables),
@@ -130,7 +153,11 @@ def build_sinks(settings: Settings, folder: Path, descriptions: dict[str, Any]) 
         "hazards": lambda: HazardSink(folder / "hazards.jsonl"),
         "video": lambda: VideoSink(folder / "annotated.mp4", settings.video),
         "report": lambda: ReportSink(
-            folder / "report.html", settings.report, descriptions, warning_gap_m=settings.hazard.buffer_m
+            folder / "report.html",
+            settings.report,
+            descriptions,
+            warning_gap_m=settings.hazard.buffer_m,
+            at_close=at_close,
         ),
     }
     return {name: makers[name]() for name in settings.outputs}

@@ -82,5 +82,14 @@ def test_markers_that_contradict_something_are_refused(ground: dict[str, object]
 
 
 def test_markers_that_no_ground_stage_reads_are_refused_not_ignored() -> None:
-    with pytest.raises(ConfigError, match=r"replace\.ground"):
-        build_ground(load_settings(None, {"ground": {"markers": [{"size_m": 1.0}]}}))
+    marker = {"size_m": 1.0, "x_m": 4.0, "y_m": 2.0}
+    with pytest.raises(ConfigError, match="take the markers out"):
+        build_ground(load_settings(None, {"ground": {"markers": [marker], "reference": {"square_m": 2.0}}}))
+
+
+def test_the_command_line_s_auto_keeps_the_file_s_markers_and_none_ends_all_measuring(tmp_path: Path) -> None:
+    file = tmp_path / "site.yaml"
+    file.write_text("ground: {auto: false, markers: [{id: 9, size_m: 1}]}\n", encoding="utf-8")
+    auto = load_settings(file, {"ground": _ground_overrides("auto", None, None)}).ground
+    none = load_settings(file, {"ground": _ground_overrides("none", None, None)}).ground
+    assert (auto.auto, len(auto.markers), none.auto, len(none.markers)) == (True, 1, False, 0)

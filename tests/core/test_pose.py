@@ -5,13 +5,14 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tolerances import DISTORTION_PX, GEOMETRY_REL
+from laws import examples
+from tolerances import DERIVATIVE_REL, DISTORTION_PX, GEOMETRY_REL, TURN_RAD
 
 from standoff.core import homography
 from standoff.core.camera import Camera
 from standoff.core.errors import GroundError
 from standoff.core.homography import FloatArray
-from standoff.core.pose import View, view_from_homography
+from standoff.core.pose import CHANGES, View, rotation_from_vector, vector_from_rotation, view_from_homography
 
 _CAMERA = Camera(
     1920,
@@ -120,3 +121,68 @@ def test_maps_that_no_camera_above_the_ground_has_are_refused() -> None:
         view_from_homography(np.diag([-1.0, 1.0, 1.0]) @ image_to_ground, _CAMERA)
     with pytest.raises(GroundError, match="inverse"):
         view_from_homography(np.zeros((3, 3)), _CAMERA)
+
+
+def _change(seed: int) -> FloatArray:
+    rng = np.random.default_rng(seed)
+    change: FloatArray = rng.normal(size=CHANGES) * np.array([0.3] * 3 + [5.0] * 3 + [0.2, 0.02])
+    return change
+
+
+@examples(30)
+@given(st.integers(0, 10_000))
+def test_derivatives_of_the_projection_are_those_of_small_differences(seed: int) -> None:
+    view = _view(seed)
+    points_m = _points_in_view(view, seed)
+    points_m = points_m[np.isfinite(points_m).all(axis=1)]
+    points_px, by_view, by_point = view.project_with_jacobians(points_m)
+    np.testing.assert_allclose(points_px, view.project(points_m), atol=DISTORTION_PX)
+    for k in range(CHANGES):
+        step = np.zeros(CHANGES)
+        step[k] = 1e-5
+        apart = view.changed(step).project(points_m) - view.changed(-step).project(points_m)
+        _assert_slopes(by_view[:, :, k], apart / 2e-5)
+    for k in range(3):
+        step_m = np.eye(3)[k] * 1e-4
+        _assert_slopes(by_point[:, :, k], (view.project(points_m + step_m) - view.project(points_m - step_m)) / 2e-4)
+
+
+def _assert_slopes(slopes: FloatArray, expected: FloatArray) -> None:
+    np.testing.assert_allclose(slopes, expected, rtol=DERIVATIVE_REL, atol=DERIVATIVE_REL * np.abs(expected).max())
+
+
+def test_what_is_behind_the_camera_has_no_derivatives() -> None:
+    view = View.aimed(_CAMERA, np.array([0.0, 0.0, 10.0]), heading_deg=0.0, pitch_deg=45.0)
+    for found in view.project_with_jacobians(np.array([[0.0, -50.0, 0.0]])):
+        assert np.isnan(found).all()
+
+
+@given(st.integers(0, 10_000))
+def test_a_change_leads_from_one_view_to_the_other(seed: int) -> None:
+    view, change = _view(seed), _change(seed)
+    changed = view.changed(change)
+    np.testing.assert_allclose(changed.change_from(view), change, atol=TURN_RAD)
+    back = view.changed(changed.change_from(view))
+    np.testing.assert_allclose(back.site_to_camera, changed.site_to_camera, atol=TURN_RAD)
+    np.testing.assert_allclose(view.change_from(view), 0.0, atol=TURN_RAD)
+
+
+def test_two_thousand_changes_in_a_row_leave_a_rotation() -> None:
+    view, change = _view(1), np.array([1e-3, -2e-3, 3e-3, 0.0, 0.0, 0.0, 0.0, 0.0])
+    for _ in range(2_000):
+        view = view.changed(change)
+    np.testing.assert_allclose(view.site_to_camera @ view.site_to_camera.T, np.eye(3), atol=TURN_RAD)
+
+
+def test_a_change_of_the_pose_leaves_the_lens_alone() -> None:
+    view = _view(3)
+    assert view.changed(np.array([0.1, 0.0, 0.0, 1.0, 2.0, 3.0, 0.0, 0.0])).camera is view.camera
+
+
+@given(st.integers(0, 10_000), st.floats(0.0, 3.1))
+def test_a_rotation_vector_becomes_opencv_s_rotation_and_comes_back(seed: int, angle: float) -> None:
+    axis = np.random.default_rng(seed).normal(size=3)
+    vector = axis / np.linalg.norm(axis) * angle
+    rotation = rotation_from_vector(vector)
+    np.testing.assert_allclose(rotation, cv2.Rodrigues(vector)[0], atol=TURN_RAD)
+    np.testing.assert_allclose(vector_from_rotation(rotation), vector, atol=TURN_RAD)

@@ -25,7 +25,7 @@ _ROWS: dict[type[Any], dict[str, Any]] = {
         "xy_m": [[1.0, 2.0], [np.nan, np.nan]],
         "velocity_mps": np.zeros((2, 2)),
         "covariance_m2": np.zeros((2, 2, 2)),
-        "map_factor_m": np.zeros((2, 2, 9)),
+        "map_factor_m": np.zeros((2, 2, 10)),
         "radius_m": [2.0, 12.1],
         "valid": [True, False],
         "reason": ["", "beyond the horizon"],
@@ -151,8 +151,14 @@ def test_a_ground_map_refuses_nan_and_is_read_only(name: str) -> None:
 def test_a_ground_map_refuses_matrices_of_another_shape() -> None:
     with pytest.raises(ValueError, match="reshape"):
         ground_map(image_to_ground=np.eye(4))
-    with pytest.raises(ValueError, match="reshape"):
+    with pytest.raises(ValueError, match="must be"):
         ground_map(covariance=np.eye(8))
+
+
+def test_a_covariance_of_the_entries_alone_says_that_the_lens_is_taken_as_it_is() -> None:
+    padded = ground_map(covariance=np.eye(9)).covariance
+    np.testing.assert_array_equal(padded[:9, :9], np.eye(9))
+    assert not padded[9].any() and not padded[:, 9].any()
 
 
 def test_a_ground_map_goes_to_the_ground_and_back_through_the_lens() -> None:

@@ -52,7 +52,7 @@ def test_the_table_has_a_row_for_every_class() -> None:
 
 def test_a_detector_without_errors_finds_the_truth() -> None:
     exact = {
-        name: replace(noise, found=(50.0, 0.0, 0.0), edge_bias=(0, 0, 0, 0), edge_share=0.0, edge_px=0.0)
+        name: replace(noise, found=(50.0, 0.0, 0.0), edge_bias=(0, 0, 0, 0), edge_share=(0, 0, 0, 0), edge_px=0.0)
         for name, noise in _NONE_FALSE.items()
     }
     (row,) = NoisyDetector(_SIZE_PX, np.random.default_rng(0), exact).detect(7, 0.5, [_worker()])
@@ -76,11 +76,12 @@ def test_nobody_is_found_where_nothing_shows() -> None:
 
 def test_edges_are_off_by_the_bias_and_the_deviation_of_the_table() -> None:
     noise = _NONE_FALSE | {
-        "worker": replace(NOISE["worker"], found=(50.0, 0, 0), edge_bias=(0.1, 0, 0, -0.05), edge_share=0.05,
+        "worker": replace(NOISE["worker"], found=(50.0, 0, 0), edge_bias=(0.1, 0, 0, -0.05),
+                          edge_share=(0.1, 0.05, 0.1, 0.05),
                           edge_px=1.0, false_per_frame=0.0)
     }  # fmt: skip
     outwards_px = (_boxes(_found(noise, _worker())) - [600.0, 300.0, 624.0, 348.0]) * [-1, -1, 1, 1]
-    sigma_px = np.hypot(0.05 * np.array([24.0, 48.0, 24.0, 48.0]), 1.0)
+    sigma_px = np.hypot([2.4, 2.4, 2.4, 2.4], 1.0)
     np.testing.assert_allclose(outwards_px.mean(axis=0), [2.4, 0.0, 0.0, -2.4], atol=4 * sigma_px.max() / _COUNT**0.5)
     np.testing.assert_allclose(outwards_px.std(axis=0), sigma_px, rtol=4 / (2 * _COUNT) ** 0.5)
 

@@ -48,7 +48,7 @@ def pair(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def _looks_deg(clip: Path) -> FloatArray:
     """Return where the camera looks in each frame, clockwise from north."""
     forward = np.array(pq.read_table(clip / "frames.parquet")["site_to_camera"].to_pylist())[:, 6:8]
-    return np.rad2deg(np.arctan2(forward[:, 0], forward[:, 1]))
+    return np.asarray(np.rad2deg(np.arctan2(forward[:, 0], forward[:, 1])))
 
 
 def test_a_clip_without_pictures_has_every_table_and_no_film(pair: Path) -> None:
@@ -89,7 +89,8 @@ def test_the_reference_object_says_how_high_it_stands_above_the_ground(pair: Pat
     top_m, base_m = np.array(reference["top_m"]), np.array(reference["base_m"])
     assert reference["ground_m"] == pytest.approx(base_m[:, 2].mean(), rel=GEOMETRY_REL)
     settings = load_settings(pair / "camera-1" / "reference.yaml").ground.reference
-    assert settings is not None and settings.height_m == pytest.approx(top_m[:, 2].mean() - base_m[:, 2].mean())
+    assert settings is not None and settings.height_m is not None
+    assert settings.height_m == pytest.approx(top_m[:, 2].mean() - base_m[:, 2].mean())
     assert 0.2 < settings.height_m < 0.4
 
 

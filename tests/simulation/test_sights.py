@@ -79,7 +79,7 @@ def test_bars_hide_nobody() -> None:
 def test_beyond_the_edge_of_the_picture_the_box_ends_there_and_the_share_falls() -> None:
     excavator = make_excavator(np.random.default_rng(0))
     whole, cut_off = _sight(_scene(model=excavator)), _sight(_scene(model=excavator, at=(19.5, 0.0)))
-    assert whole.visible_share == 1.0
+    assert whole.visible_share > 0.99
     assert 0.1 < cut_off.visible_share < 0.95
     assert cut_off.box_px[2] == 1279.5 < cut_off.full_px[2]
 

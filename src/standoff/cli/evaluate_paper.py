@@ -14,18 +14,20 @@ if TYPE_CHECKING:
     from standoff.evaluation.paper import BoxError, ClipResult, Trial
     from standoff.simulation.presets import Plan
 
-Method = Literal["paper", "paper+tls", "oriented"]
+Method = Literal["fused", "refined", "paper", "paper+tls", "oriented"]
 Anchor = Literal["bottom_centre", "box_centre"]
 Boxes = Literal["truth", "noisy"]
+CameraFile = Literal["file", "unknown"]
+Height = Literal["known", "unknown"]
 
 
 def paper(
     clips: Annotated[
         list[Path] | None, typer.Argument(help="Folders that `standoff simulate` wrote.", show_default=False)
     ] = None,
-    method: Annotated[Method, typer.Option(help="How the reference's corners are found; `paper` is as printed.")] = (
-        "paper"
-    ),
+    method: Annotated[
+        Method, typer.Option(help="How the reference is found; `fused` is standoff's default, `paper` as printed.")
+    ] = ("paper"),
     detector: Annotated[
         str,
         typer.Option(
@@ -37,6 +39,11 @@ def paper(
         Anchor | None,
         typer.Option(help="Point of a box that is the entity. Left out: the centre with `paper`, else the foot."),
     ] = None,
+    camera: Annotated[
+        CameraFile | None,
+        typer.Option(help="Whether the clip's camera file is known. Left out: unknown with `paper`, else known."),
+    ] = None,
+    height: Annotated[Height, typer.Option(help="Whether the reference's height is known.")] = "known",
     box_error: Annotated[
         str | None, typer.Option(help="For noisy: standard error of each edge; px, or a share of the box as 6%.")
     ] = None,
@@ -57,7 +64,7 @@ def paper(
     from standoff.cli.paper_tables import print_results
     from standoff.evaluation.paper import Trial, write_report
 
-    trial = Trial(method, _detector(detector), anchor, _box_error(detector, box_error), seed)
+    trial = Trial(method, _detector(detector), anchor, _box_error(detector, box_error), seed, camera, height)
     folders = list(clips or ())
     if every_preset == bool(folders):
         raise ConfigError(
@@ -175,9 +182,12 @@ def _evaluate(folder: Path, trial: Trial) -> ClipResult:
 
 def _as_json(results: Sequence[ClipResult], failures: Mapping[str, StandoffError]) -> dict[str, Any]:
     from standoff import __version__
+    from standoff.evaluation.paper import pool
 
+    pooled = pool(results)
     return {
         "standoff": __version__,
         "clips": [result.to_dict() for result in results],
+        "map_only": None if pooled is None else pooled.to_dict(),
         "failed": [{"clip": name, "why": str(error)} for name, error in failures.items()],
     }

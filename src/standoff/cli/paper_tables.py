@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -9,6 +10,8 @@ from standoff.cli.console import print_table
 
 if TYPE_CHECKING:
     from standoff.evaluation.paper import ClipResult
+    from standoff.evaluation.paper.map_only import MapFigures
+    from standoff.evaluation.paper.pooled import Interval
 
 
 def print_results(results: Sequence[ClipResult]) -> None:
@@ -18,8 +21,10 @@ def print_results(results: Sequence[ClipResult]) -> None:
     _print_rectification(results)
     _print_distances(results)
     _print_benchmark(results)
+    _print_map_only(results)
     facts = "; ".join(f"{name}: {value}" for name, value in results[0].trial.describe().items())
     print_table("", ("", ""), [("tried", facts)], texts=2)
+    _print_pooled(results)
 
 
 def _print_figures(result: ClipResult) -> None:
@@ -75,6 +80,80 @@ def _print_distances(results: Sequence[ClipResult]) -> None:
             "Measured: of the frames of all pairs of the kind."
         )
         print_table("Distances of workers from machines", columns, rows, caption, texts=2)
+
+
+def _print_map_only(results: Sequence[ClipResult]) -> None:
+    rows = []
+    for result in results:
+        if (score := result.map_only) is not None:
+            missing = f"{score.without_map}, {score.without_map_since_seen}"
+            rows.append((result.clip.name, missing, *_map_figures(score.level)))
+            rows.append(("  uneven", "", *_map_figures(score.uneven)))
+    if rows:
+        columns = ("clip", "no map", *(label for _, label in _MAP_FIGURES))
+        caption = (
+            "True feet within 20 m of the reference through the map, m, without boxes and filters: if the ground were "
+            "level, then as it is. No map: frames in all, and of these since the whole reference was first seen. "
+            "Inside: of the map's own 95 % region. Wrong: off by more than 0.5 m and more than five of the standard "
+            "errors that it states (sigma)."
+        )
+        print_table("The map alone", columns, rows, caption)
+
+
+_MAP_FIGURES = (
+    ("median_m", "median"),
+    ("p95_m", "95 %"),
+    ("worst_m", "worst"),
+    ("inside_share", "inside %"),
+    ("believed_wrong_share", "wrong %"),
+    ("sigma_m", "sigma"),
+)
+
+
+def _map_figures(figures: MapFigures) -> list[str]:
+    return [_map_number(name, getattr(figures, name)) for name, _ in _MAP_FIGURES]
+
+
+def _map_number(name: str, value: float) -> str:
+    if math.isnan(value):
+        return "none"
+    return f"{100 * value:.1f}" if name.endswith("_share") else f"{value:.3f}"
+
+
+def _print_pooled(results: Sequence[ClipResult]) -> None:
+    from standoff.evaluation.paper import pool
+
+    pooled = pool(results)
+    if pooled is None or pooled.clips < 2:
+        return
+    kinds = (("level", pooled.level), ("uneven", pooled.uneven))
+    rows = [
+        (label, *(_with_interval(name, getattr(of, name), pooled.intervals[f"{kind} {name}"]) for kind, of in kinds))
+        for name, label in _LONG.items()
+    ]
+    for name, label in (
+        ("without_map_share", "frames without a map, %"),
+        ("without_map_since_seen_share", "the same once seen, %"),
+    ):
+        share = _with_interval(name, getattr(pooled, name), pooled.intervals[name])
+        rows.append((label, share, ""))
+    caption = "In brackets: 95 % of a bootstrap over the clips."
+    print_table(f"The map alone, {pooled.clips} clips", ("", "level ground", "ground as it is"), rows, caption)
+
+
+_LONG = {
+    "median_m": "median error, m",
+    "p95_m": "95th percentile, m",
+    "worst_m": "worst, m",
+    "inside_share": "inside the map's 95 %, %",
+    "believed_wrong_share": "wrong and believed, %",
+    "sigma_m": "stated sigma, median, m",
+}
+
+
+def _with_interval(name: str, value: float, interval: Interval) -> str:
+    low, high = (_map_number(name, end) for end in interval)
+    return f"{_map_number(name, value)} ({low} to {high})"
 
 
 def _print_benchmark(results: Sequence[ClipResult]) -> None:

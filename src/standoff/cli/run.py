@@ -72,12 +72,13 @@ def _ground_overrides(ground: str | None, box: str | None, camera: Path | None) 
     overrides: dict[str, Any] = {}
     if ground is not None and ground.startswith("marker:"):
         overrides |= _marker_override(ground)
-    elif ground == "none":
-        overrides |= {"survey": None, "reference": None}
+        overrides["auto"] = True
+    elif ground in ("auto", "none"):
+        overrides |= {"survey": None, "reference": None, "auto": ground == "auto"}
     elif ground is not None:
         shape = _shape_overrides(ground)
         overrides |= {"survey": None if shape else ground, "reference": shape}
-    if ground is not None:
+    if ground not in (None, "auto"):
         # What the command line names is the ground; the file's markers may lie in another frame.
         overrides.setdefault("markers", [])
     if box is not None:
@@ -123,7 +124,7 @@ def run(
         typer.Option(
             help="square:SIDE or rectangle:LENGTH,WIDTH (a reference object, m; ,height=H where its top is so high "
             "above the ground), marker:SIZE[,id=ID] (a printed marker, black square in m), survey.yaml (surveyed "
-            "points), or none."
+            "points), auto (the default: markers of the settings, the drone's telemetry, sizes of people), or none."
         ),
     ] = None,
     reference_box: Annotated[
@@ -168,12 +169,16 @@ def run(
     opened = open_run(source, out, load_settings(config, overrides), overwrite=overwrite)
     for warning in (*opened.source.warnings, *ground_warnings(opened.pipeline.ground)):
         typer.echo(f"standoff: warning: {warning}", err=True)
+    known = set(ground_warnings(opened.pipeline.ground))
     try:
         watch(opened, quiet=quiet)
     except StandoffError:
         # Its own line says it all; only a machine still wants the record.
         tell(out / RECORD, as_json=as_json, quiet=True)
         raise
+    for warning in ground_warnings(opened.pipeline.ground):
+        if warning not in known:
+            typer.echo(f"standoff: warning: {warning}", err=True)
     tell(out / RECORD, as_json=as_json, quiet=quiet)
     raise typer.Exit(exit_status(out / RECORD))
 

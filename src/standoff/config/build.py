@@ -6,7 +6,7 @@ import importlib
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-from standoff.config.settings import Replacement, Settings, StageName
+from standoff.config.settings import ReferenceSettings, Replacement, Settings, StageName
 from standoff.core.camera import Camera, CameraPrior
 from standoff.core.errors import ConfigError
 from standoff.core.protocols import CameraMotionEstimator, Detector, Ground
@@ -17,7 +17,10 @@ from standoff.stages.ground import (
     FusedGround,
     GivenPlace,
     MarkerObserver,
+    ObservedGround,
+    ObservedParams,
     ReferenceGround,
+    ScaleWatch,
     Unmapped,
     load_camera,
     load_survey,
@@ -101,7 +104,7 @@ def build_marker_observer(settings: Settings) -> MarkerObserver | None:
 
 
 def build_ground(settings: Settings, known: CameraPrior | None = None) -> Ground:
-    """Make the configured ground stage.
+    """Make the configured ground stage, with a watch over its metres.
 
     Args:
         settings: Of everything.
@@ -111,18 +114,27 @@ def build_ground(settings: Settings, known: CameraPrior | None = None) -> Ground
         GroundError: Its points, shape or camera file cannot be used.
     """
     camera = _configured_camera(settings)
+    prior = known if camera is None else CameraPrior.calibrated(camera)
+    if settings.ground.survey is None and settings.ground.reference is None:
+        auto = settings.ground.auto
+        if not (auto or settings.ground.markers):
+            return Unmapped()
+        params = ObservedParams(telemetry=auto, sizes=auto)
+        return ScaleWatch(ObservedGround(build_marker_observer(settings), camera=prior, params=params), prior)
     if settings.ground.markers:
         # Silence about a marker that nobody reads would pass for a site without one.
         raise ConfigError(
-            expected="a ground stage of your own that reads markers (replace.ground)",
-            found="ground.markers with standoff's own, which does not read them yet",
-            fix="take the markers out, or describe a reference object or a survey",
+            expected="markers, or a reference object or a survey",
+            found="ground.markers beside another ground, which does not read them",
+            fix="take the markers out, or the reference or survey",
         )
     if settings.ground.survey is not None:
-        return load_survey(settings.ground.survey, camera=camera)
-    reference = settings.ground.reference
-    if reference is None:
-        return Unmapped()
+        return ScaleWatch(load_survey(settings.ground.survey, camera=camera), prior)
+    return ScaleWatch(_reference_ground(settings.ground.reference, camera, prior), prior)
+
+
+def _reference_ground(reference: ReferenceSettings | None, camera: Camera | None, prior: CameraPrior | None) -> Ground:
+    assert reference is not None, "the only one that is left"
     place = GivenPlace(reference.box_px, reference.box_time_s, reference.first_corner_px)
     method = reference.params.method
     if method not in ("fused", "refined"):
@@ -132,7 +144,7 @@ def build_ground(settings: Settings, known: CameraPrior | None = None) -> Ground
         reference.params,
         height_m=reference.height_m,
         place=place,
-        camera=known if camera is None else CameraPrior.calibrated(camera),
+        camera=prior,
         remember=method == "fused",
     )
 

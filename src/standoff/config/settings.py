@@ -92,7 +92,15 @@ class ReferenceSettings(_Section):
 
 
 class GroundSettings(_Section):
-    """Where a pixel becomes a metre: a survey, or a reference object, or nothing (no measurement)."""
+    """Where a pixel becomes a metre: a survey, a reference object, markers, or what the source tells by itself."""
+
+    auto: Annotated[
+        bool,
+        Field(
+            description="Without survey and reference: measure by the drone's telemetry and by the sizes of people as "
+            "well. False: by markers only, and by nothing where there are none."
+        ),
+    ] = True
 
     survey: Annotated[Path | None, Field(description="YAML file of surveyed points, for a fixed camera.")] = None
     reference: Annotated[

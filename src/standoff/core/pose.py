@@ -192,7 +192,7 @@ def rotation_from_vector(vector: FloatArray) -> FloatArray:
     """
     angle = float(np.linalg.norm(vector))
     x, y, z = vector
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    cross: FloatArray = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     if angle < 1e-8:
         return np.eye(3) + cross
     rotation: FloatArray = (

@@ -207,6 +207,8 @@ class GroundMap:
     def __post_init__(self) -> None:
         covariance = np.zeros((10, 10))
         given = np.asarray(self.covariance, dtype=np.float64)
+        if given.shape not in {(9, 9), (10, 10)}:
+            raise ValueError(f"GroundMap.covariance must be (9, 9) or (10, 10), not {given.shape}")
         covariance[: len(given), : len(given)] = given
         object.__setattr__(self, "covariance", covariance)
         shapes = {"image_to_ground": (3, 3), "covariance": (10, 10), "valid_px": (-1, 2), "anchors_px": (-1, 2)}

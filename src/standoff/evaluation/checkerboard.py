@@ -16,16 +16,21 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 
 from standoff.core import homography
-from standoff.core.camera import Camera
+from standoff.core.camera import Camera, CameraPrior
 from standoff.core.errors import DataError
 from standoff.core.homography import FloatArray
-from standoff.stages.ground.boards import BoardView, read_boards
+from standoff.core.pose import CHANGES
+from standoff.stages.ground import BoardView, PointObservation, belief_from_points, map_from_view, read_boards
+from standoff.stages.ground.solid_fit import Belief
 
 FIRST_CORNER = "of the board's four outer corners the one nearest to the picture's top left"
+
+
+_CORNER_SIGMA_PX = 0.13
+"""Standard error of a coordinate of a found corner: calibrations leave 0.18 px of both together."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,7 +44,8 @@ class ViewAccuracy:
         truth_m: (T,) true distances.
         before_m: (T,) by Eq. 6's scale alone.
         after_m: (T,) through the homography of the first square.
-        after_pose_m: (T,) through the camera pose that the first square gives; NaN without a camera.
+        after_pose_m: (T,) through the map that the ground stage makes of the first square, a flat reference object, and
+            the camera; NaN without a camera.
     """
 
     name: str
@@ -239,9 +245,9 @@ def _measure(view: BoardView, square_m: float, camera: Camera | None) -> ViewAcc
     pose_m, tilt_deg = np.full_like(grid_px, np.nan), float("nan")
     if camera is not None:
         camera = _fitting(camera, view)
+        pose_m = _through_ground_stage(grid_px, grid_m, camera)
+        tilt_deg = _tilt_deg(grid_px, grid_m, camera)
         grid_px = camera.undistort(grid_px.reshape(-1, 2)).reshape(grid_px.shape)
-        pose_m = _map_all(_pose_map(grid_px[:2, :2], grid_m[:2, :2], camera)[0], grid_px)
-        tilt_deg = _pose_map(grid_px, grid_m, camera)[1]
     square_px, square_corners_m = grid_px[:2, :2].reshape(-1, 2), grid_m[:2, :2].reshape(-1, 2)
     after_m = _map_all(homography.fit(square_px, square_corners_m), grid_px)
     scale_m_per_px = square_m / float(np.linalg.norm(grid_px[0, 1] - grid_px[0, 0]))
@@ -273,16 +279,32 @@ def _map_all(image_to_ground: FloatArray, grid_px: FloatArray) -> FloatArray:
     return homography.apply(image_to_ground, grid_px.reshape(-1, 2))[0].reshape(grid_px.shape)
 
 
-def _pose_map(grid_px: FloatArray, grid_m: FloatArray, camera: Camera) -> tuple[FloatArray, float]:
-    """Return the homography of the camera pose that fits undistorted corners best, and its tilt in degrees."""
-    board_m = np.column_stack([grid_m.reshape(-1, 2), np.zeros(grid_m.size // 2)])
-    points_px = grid_px.reshape(-1, 2)
-    _, rotation, shift_m = cv2.solvePnP(board_m, points_px, camera.matrix, None, flags=cv2.SOLVEPNP_IPPE)
-    rotation, shift_m = cv2.solvePnPRefineLM(board_m, points_px, camera.matrix, None, rotation, shift_m)
-    axes = cv2.Rodrigues(rotation)[0]
-    ground_to_image = camera.matrix @ np.column_stack([axes[:, 0], axes[:, 1], shift_m.ravel()])
-    tilt_deg = float(np.degrees(np.arccos(min(1.0, abs(axes[2, 2])))))
-    return homography.signed(homography.invert(ground_to_image), points_px[0]), tilt_deg
+def _through_ground_stage(grid_px: FloatArray, grid_m: FloatArray, camera: Camera) -> FloatArray:
+    """Return the grid's places through the ground stage's own map from a flat reference: the first square."""
+    belief = _belief(grid_px[:2, :2], grid_m[:2, :2], camera)
+    covariance = np.linalg.inv(belief.information)[:CHANGES, :CHANGES]
+    square_px = grid_px[:2, :2].reshape(-1, 2)
+    ground = map_from_view(
+        belief.state.view, covariance, method="first square", scale_m_per_px=np.nan, anchors_px=square_px
+    )
+    return ground.to_ground(grid_px.reshape(-1, 2))[0].reshape(grid_px.shape)
+
+
+def _tilt_deg(grid_px: FloatArray, grid_m: FloatArray, camera: Camera) -> float:
+    """Return the angle between the board's normal and the camera's axis, by all corners."""
+    toward = _belief(grid_px, grid_m, camera).state.view.site_to_camera[2, 2]
+    return float(np.degrees(np.arccos(min(1.0, abs(toward)))))
+
+
+def _belief(grid_px: FloatArray, grid_m: FloatArray, camera: Camera) -> Belief:
+    """Return where the camera is, the board being the ground."""
+    along, across = grid_px[0, -1] - grid_px[0, 0], grid_px[-1, 0] - grid_px[0, 0]
+    # Seen from above y is to the left of x; rows that run to its right run down.
+    left = -1.0 if along[0] * across[1] > along[1] * across[0] else 1.0
+    points_m = np.column_stack([grid_m.reshape(-1, 2) * [1.0, left], np.zeros(grid_m.size // 2)])
+    sigma_px = np.full(len(points_m), _CORNER_SIGMA_PX)
+    seen = PointObservation("the board's corners", points_m, grid_px.reshape(-1, 2), sigma_px)
+    return belief_from_points(CameraPrior.calibrated(camera), seen)
 
 
 def _or_none(value: float) -> float | None:

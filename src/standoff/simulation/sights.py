@@ -41,6 +41,9 @@ _LENS_SHARE = 0.06
 _FAR_OUT_PX = 2e4
 _CROSS = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], np.uint8)
 
+_SOMETHING = 0xFFFE
+"""In the picture of ids: what hides entities and is none."""
+
 Polygon = npt.NDArray[np.int32]
 
 
@@ -214,16 +217,19 @@ class Outlines:
         order_m = np.concatenate([np.empty(0), *(outline.order_m for outline in outlines)])
         for k in np.argsort(-order_m, kind="stable").tolist():
             polygon, entity_id = polygons[k]
-            cv2.fillConvexPoly(ids, polygon, entity_id, cv2.LINE_8, _SUB_BITS)
+            cv2.fillConvexPoly(ids, polygon, entity_id or _SOMETHING, cv2.LINE_8, _SUB_BITS)
         return ids
 
     def _sight(self, outline: _Outline, ids: npt.NDArray[np.uint16]) -> Sight:
         nothing = Sight(np.full(4, np.nan), outline.full_px, 0, 0.0)
         if not outline.above:
             return nothing
-        alone, (left, top) = self._silhouette(outline.above)
+        (left, top), (right, bottom) = self._window(outline.above)
+        alone = self._untouched(outline, ids[max(top, 0) : bottom, max(left, 0) : right], right - left, bottom - top)
+        if alone is None:
+            alone = self._silhouette(outline.above)
         dug_in = outline.whole is not outline.above
-        whole = alone if not dug_in else self._silhouette(outline.whole)[0]
+        whole = alone if not dug_in else self._silhouette(outline.whole)
         own_ids = ids[max(top, 0) : top + alone.shape[0], max(left, 0) : left + alone.shape[1]]
         seen = own_ids == outline.entity_id
         inside = alone[max(-top, 0) :, max(-left, 0) :][: seen.shape[0], : seen.shape[1]] > 0
@@ -239,22 +245,34 @@ class Outlines:
         ends = (np.abs(seen_px - inside_px) <= _EDGE_PX) & np.isfinite(exact_px)
         return Sight(np.where(ends, exact_px, measured_px), outline.full_px, visible_px, min(1.0, count / whole_count))
 
-    def _silhouette(self, polygons: Sequence[Polygon]) -> tuple[npt.NDArray[np.uint8], tuple[int, int]]:
-        """Draw polygons alone, as far as one picture's size outside the picture.
+    def _untouched(
+        self, outline: _Outline, own_ids: npt.NDArray[np.uint16], width: int, height: int
+    ) -> npt.NDArray[np.uint8] | None:
+        """Read a silhouette off the picture of ids where nothing else is near; None where something is."""
+        if own_ids.shape != (height, width) or outline.whole is not outline.above:
+            return None
+        alone = own_ids == outline.entity_id
+        return alone.astype(np.uint8) if np.count_nonzero(alone) == np.count_nonzero(own_ids) else None
 
-        Returns:
-            The mask, and column and row of its top-left pixel in the drawn picture.
+    def _window(self, polygons: Sequence[Polygon]) -> tuple[tuple[int, int], tuple[int, int]]:
+        """Return column and row of the first pixel around polygons and of the one after the last.
+
+        It ends one picture's size outside the picture.
         """
         size = np.ceil(self._size_px / self._factor).astype(np.int64)
         corners = np.concatenate(polygons).astype(np.int64)
-        low = np.clip((corners.min(axis=0) >> _SUB_BITS) - 1, -size, 2 * size)
-        high = np.clip((corners.max(axis=0) >> _SUB_BITS) + 3, -size, 2 * size)
-        columns, rows = np.maximum(high - low, 1).tolist()
-        mask = np.zeros((rows, columns), np.uint8)
-        shift = (low << _SUB_BITS).astype(np.int32)
+        low = np.clip((corners.min(axis=0) >> _SUB_BITS) - 1, -size, 2 * size - 1)
+        high = np.maximum(np.clip((corners.max(axis=0) >> _SUB_BITS) + 3, -size, 2 * size), low + 1)
+        return (int(low[0]), int(low[1])), (int(high[0]), int(high[1]))
+
+    def _silhouette(self, polygons: Sequence[Polygon]) -> npt.NDArray[np.uint8]:
+        """Draw polygons alone, in their window."""
+        (left, top), (right, bottom) = self._window(polygons)
+        mask = np.zeros((bottom - top, right - left), np.uint8)
+        shift = np.array([left << _SUB_BITS, top << _SUB_BITS], np.int32)
         for polygon in polygons:
             cv2.fillConvexPoly(mask, polygon - shift, 1, cv2.LINE_8, _SUB_BITS)
-        return mask, (int(low[0]), int(low[1]))
+        return mask
 
 
 def _box(points_px: FloatArray) -> FloatArray:

@@ -36,7 +36,7 @@ def frame(gaps: Gaps, sigma_m: float = 0.1, order: Sequence[int] | None = None) 
         xy_m=np.where(valid[:, None], np.zeros((count, 2)), np.nan),
         velocity_mps=np.zeros((count, 2)),
         covariance_m2=np.zeros((count, 2, 2)),
-        map_factor_m=np.zeros((count, 2, 9)),
+        map_factor_m=np.zeros((count, 2, 10)),
         radius_m=np.zeros(count),
         valid=valid,
         reason=np.where(valid, "", CUT_OFF).astype(object),

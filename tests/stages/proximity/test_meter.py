@@ -36,7 +36,7 @@ def positions_of(
         xy_m=place,
         velocity_mps=np.zeros((count, 2)) if velocity_mps is None else velocity_mps,
         covariance_m2=np.tile(np.eye(2) * 0.01, (count, 1, 1)) if covariance_m2 is None else covariance_m2,
-        map_factor_m=np.zeros((count, 2, 9)) if map_factor_m is None else map_factor_m,
+        map_factor_m=np.zeros((count, 2, 10)) if map_factor_m is None else map_factor_m,
         radius_m=np.array([CLASSES[i].action_radius_m for i in class_id]),
         valid=valid,
         reason=np.where(valid, "", "beyond the horizon").astype(object),
@@ -114,7 +114,7 @@ def test_nothing_depends_on_where_north_is_or_in_which_order_the_rows_come(
 ) -> None:
     rng = np.random.default_rng(3)
     spread = rng.normal(size=(4, 2, 2))
-    factor_m = rng.normal(size=(4, 2, 9)) * 0.1
+    factor_m = rng.normal(size=(4, 2, 10)) * 0.1
     covariance = spread @ spread.transpose(0, 2, 1) + factor_m @ factor_m.transpose(0, 2, 1)
     velocity = rng.normal(size=(4, 2))
     rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
@@ -136,7 +136,7 @@ def test_nothing_depends_on_where_north_is_or_in_which_order_the_rows_come(
 
 
 def test_an_error_that_both_share_through_the_map_does_not_count() -> None:
-    shared = np.zeros((2, 2, 9))
+    shared = np.zeros((2, 2, 10))
     shared[:, 0, 0] = shared[:, 1, 1] = 3.0
     covariance = np.tile(np.eye(2) * (0.01 + 9.0), (2, 1, 1))
     found = measured(positions_of([(0.0, 0.0), (20.0, 0.0)], [0, 1], covariance_m2=covariance, map_factor_m=shared))

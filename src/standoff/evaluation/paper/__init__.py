@@ -7,6 +7,7 @@ for figure in evaluate_clip(load_clip("clips/mobile"), Trial(method="oriented"))
 """
 
 from standoff.evaluation.paper.clip import Clip, load_clip
+from standoff.evaluation.paper.pooled import PooledMap, pool
 from standoff.evaluation.paper.report import write_report
 from standoff.evaluation.paper.result import ClipResult, PaperFigure, evaluate_clip
 from standoff.evaluation.paper.trial import Trial
@@ -17,8 +18,10 @@ __all__ = [
     "Clip",
     "ClipResult",
     "PaperFigure",
+    "PooledMap",
     "Trial",
     "evaluate_clip",
     "load_clip",
+    "pool",
     "write_report",
 ]

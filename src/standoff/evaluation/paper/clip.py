@@ -29,6 +29,7 @@ class TrueReference:
     Attributes:
         entity_id: In the truth.
         corners_m: (4, 2) of its top, site frame.
+        ground_m: Height of the ground on which it stands, site frame: the plane of a map.
         corners_px: (F, 4, 2) the same corners in each picture; NaN where no lens sees them.
         visible_share: (F,) of its pixels that can be seen.
         covered: (F,) whether something lies on it.
@@ -36,6 +37,7 @@ class TrueReference:
 
     entity_id: int
     corners_m: FloatArray
+    ground_m: float
     corners_px: FloatArray
     visible_share: FloatArray
     covered: BoolArray
@@ -70,6 +72,8 @@ class Clip:
         box_px: (F, E, 4) visible part; NaN where nothing can be seen.
         xy_m: (F, E, 2) centre of the footprint, site frame.
         foot_px: (F, E, 2) where the picture shows that centre, inside or outside.
+        camera_m: (F, 3) place of the camera, site frame.
+        site_to_camera: (F, 3, 3) its rotation.
         reference_box_px: (F, 4) visible part of the reference; NaN where nothing can be seen, or without one.
         pairs: (P, 2) rows of E: each person with each machine between which there is a distance, the person first.
         distance_m: (F, P) true distance, centre to centre.
@@ -86,6 +90,8 @@ class Clip:
     box_px: FloatArray
     xy_m: FloatArray
     foot_px: FloatArray
+    camera_m: FloatArray
+    site_to_camera: FloatArray
     reference_box_px: FloatArray
     pairs: IntArray
     distance_m: FloatArray
@@ -145,7 +151,14 @@ def load_clip(folder: Path | str) -> Clip:
             found=f"neither in {folder}",
             fix="choose another preset of `standoff simulate --list`",
         )
-    return _assemble(folder, scene, truth, pairs, count, reference, board)
+    return _assemble(folder, scene, truth, pairs, frames, reference, board)
+
+
+def inside(reference: TrueReference, size_px: tuple[int, int]) -> BoolArray:
+    """Return (F,) whether all four corners are in the picture; what lies on them does not matter."""
+    # A corner that no lens sees is NaN, and NaN is not inside.
+    in_picture = (reference.corners_px >= -0.5) & (reference.corners_px <= np.array(size_px) - 0.5)
+    return np.asarray(in_picture.all(axis=(1, 2)), dtype=np.bool_)
 
 
 def _read_scene(folder: Path) -> Mapping[str, Any]:
@@ -170,10 +183,13 @@ def _reference(scene: Mapping[str, Any], frames: Columns, folder: Path) -> TrueR
     entry = scene["reference"]
     if entry is None:
         return None
-    corners_px = np.stack([_lists(frames[name], 4, folder) for name in REFERENCE_PX], axis=-1)
+    corners_px = np.stack([_lists(frames[name], 4, folder, "corners") for name in REFERENCE_PX], axis=-1)
+    base_m = np.array(entry["base_m"], dtype=np.float64)
     return TrueReference(
         entity_id=int(entry["entity_id"]),
         corners_m=np.array(entry["top_m"], dtype=np.float64)[:, :2],
+        # Clips from before the ground was noted stand on it all the same.
+        ground_m=float(entry.get("ground_m", base_m[:, 2].mean())),
         corners_px=corners_px,
         visible_share=np.nan_to_num(frames["reference_visible_share"], nan=0.0),
         covered=frames["reference_covered"].astype(np.bool_),
@@ -189,16 +205,16 @@ def _board(scene: Mapping[str, Any], frames: Columns, folder: Path) -> TrueBoard
     if side * side != corners or side < 3:
         found = f"{corners} in {folder / SCENE}"
         raise DataError(expected="a square board of at least 3x3 inner corners", found=found, fix=_FIX)
-    corners_px = np.stack([_lists(frames[f"board_{axis}_px"], corners, folder) for axis in "xy"], axis=-1)
+    corners_px = np.stack([_lists(frames[f"board_{axis}_px"], corners, folder, "corners") for axis in "xy"], axis=-1)
     return TrueBoard(side, float(entry["square_m"]), corners_px.reshape(-1, side, side, 2))
 
 
-def _lists(column: Any, length: int, folder: Path) -> FloatArray:  # noqa: ANN401 - numpy's object arrays have no type
+def _lists(column: Any, length: int, folder: Path, what: str) -> FloatArray:  # noqa: ANN401 - objects have no type
     """Return (F, length) of a column of lists."""
     rows = [np.asarray(row, dtype=np.float64) for row in column]
     if any(len(row) != length for row in rows):
         found = f"another number in frames.parquet of {folder}"
-        raise DataError(expected=f"{length} corners in every frame", found=found, fix=_FIX)
+        raise DataError(expected=f"{length} {what} in every frame", found=found, fix=_FIX)
     return np.stack(rows)
 
 
@@ -207,10 +223,11 @@ def _assemble(
     scene: Mapping[str, Any],
     truth: Columns,
     pairs: Columns,
-    count: int,
+    frames: Columns,
     reference: TrueReference | None,
     board: TrueBoard | None,
 ) -> Clip:
+    count = len(frames["frame"])
     entity_ids, rows = np.unique(truth["entity_id"], return_inverse=True)
     names = ("x1_px", "y1_px", "x2_px", "y2_px", "x_m", "y_m", "foot_x_px", "foot_y_px")
     everything = np.full((count, len(entity_ids), len(names)), np.nan)
@@ -236,6 +253,8 @@ def _assemble(
         box_px=everything[:, own, :4],
         xy_m=everything[:, own, 4:6],
         foot_px=everything[:, own, 6:],
+        camera_m=np.column_stack([frames[f"camera_{axis}_m"] for axis in "xyz"]).astype(np.float64),
+        site_to_camera=_lists(frames["site_to_camera"], 9, folder, "entries of site_to_camera").reshape(-1, 3, 3),
         reference_box_px=reference_box,
         pairs=which,
         distance_m=distance_m,

@@ -13,7 +13,8 @@ from standoff.evaluation.positions_input import Columns
 TRUTH = ("frame", "entity_id", "class_id", "x_m", "y_m", "x1_px", "y1_px", "x2_px", "y2_px", "foot_x_px", "foot_y_px")
 PAIRS = ("frame", "entity_a", "entity_b", "centre_m")
 REFERENCE_PX = ("reference_top_x_px", "reference_top_y_px")
-FRAMES = ("frame", "reference_covered", "reference_visible_share", *REFERENCE_PX, "board_x_px", "board_y_px")
+CAMERA = ("camera_x_m", "camera_y_m", "camera_z_m", "site_to_camera")
+FRAMES = ("frame", "reference_covered", "reference_visible_share", *REFERENCE_PX, "board_x_px", "board_y_px", *CAMERA)
 
 
 def read_table(path: Path, names: tuple[str, ...]) -> Columns:

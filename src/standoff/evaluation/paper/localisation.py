@@ -64,7 +64,7 @@ def _score_class(clip: Clip, watched: Watched, class_id: int, scale_m_per_px: Fl
     scale = np.broadcast_to(scale_m_per_px[:, None], detected.shape)
     scored = detected & np.isfinite(scale)
     located = visible & np.isfinite(watched.xy_m[:, own]).all(axis=2)
-    map_error_m = np.linalg.norm(watched.true_foot_m[:, own] - clip.xy_m[:, own], axis=2)
+    map_error_m = np.linalg.norm(watched.true_feet.xy_m[:, own] - clip.xy_m[:, own], axis=2)
     map_error_m = map_error_m[located & np.isfinite(map_error_m)]
     error_m = np.linalg.norm(watched.xy_m[:, own] - clip.xy_m[:, own], axis=2)
     error_m = error_m[located]

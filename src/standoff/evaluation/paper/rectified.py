@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from standoff.core.homography import BoolArray, FloatArray
-from standoff.evaluation.paper.clip import TrueReference
+from standoff.evaluation.paper.clip import TrueReference, inside
 from standoff.evaluation.paper.watch import WRONG, Watched, is_wrong
 
 
@@ -19,8 +19,8 @@ class RectificationScore:
 
     Attributes:
         frames: Of the clip.
-        out_of_sight: Frames without a map in which a corner is outside the picture, or nothing of the reference can be
-            seen.
+        out_of_sight: Frames in which a corner is outside the picture, or nothing of the reference can be seen, and
+            which have no map or one that was carried along from earlier frames.
         failed: All other frames without a map, and frames whose map has a corner more than 5 px off,
             whatever the outlier filter makes of them.
         wrong: The second kind alone.
@@ -49,9 +49,10 @@ def score_rectification(watched: Watched, reference: TrueReference) -> Rectifica
     error_px = watched.corner_error_px
     has_map = np.isfinite(watched.scale_m_per_px)
     wrong = wrong_frames(watched)
-    right = has_map & ~wrong
+    right = has_map & ~wrong & ~watched.carried
     failed = failed_frames(watched, reference)
-    out_of_sight = ~has_map & ~failed
+    judged = has_map & ~watched.carried
+    out_of_sight = ~right & ~failed
     reasons = np.where(wrong, WRONG, watched.no_map)[failed]
     looked_for = int((~out_of_sight).sum())
     return RectificationScore(
@@ -62,7 +63,7 @@ def score_rectification(watched: Watched, reference: TrueReference) -> Rectifica
         failed_covered=int((failed & reference.covered).sum()),
         failed_by_reason=dict(Counter(reasons.tolist()).most_common()),
         corner_rmse_px=_root_mean_square(error_px[right]),
-        worst_corner_px=float(np.max(error_px[has_map])) if has_map.any() else float("nan"),
+        worst_corner_px=float(np.max(error_px[judged])) if judged.any() else float("nan"),
         within_share=float(right.sum()) / looked_for if looked_for else float("nan"),
         median_s=float(np.median(watched.ground_s)),
     )
@@ -74,16 +75,12 @@ def failed_frames(watched: Watched, reference: TrueReference) -> BoolArray:
     return wrong_frames(watched) | (~np.isfinite(watched.scale_m_per_px) & in_sight)
 
 
-def inside(reference: TrueReference, size_px: tuple[int, int]) -> BoolArray:
-    """Return (F,) whether all four corners are in the picture; what lies on them does not matter."""
-    # A corner that no lens sees is NaN, and NaN is not inside.
-    in_picture = (reference.corners_px >= -0.5) & (reference.corners_px <= np.array(size_px) - 0.5)
-    return np.asarray(in_picture.all(axis=(1, 2)), dtype=np.bool_)
-
-
 def wrong_frames(watched: Watched) -> BoolArray:
-    """Return (F,) which frames have a map that should not have been believed."""
-    has_map = np.isfinite(watched.scale_m_per_px)
+    """Return (F,) which frames have a map that should not have been believed.
+
+    Where the reference is outside the picture, pixels of its corners do not tell: the map is judged on the ground alone.
+    """
+    has_map = np.isfinite(watched.scale_m_per_px) & ~watched.carried
     return np.array(
         [mapped and is_wrong(error) for mapped, error in zip(has_map, watched.corner_error_px, strict=True)]
     )

@@ -12,6 +12,7 @@ import numpy as np
 from standoff.evaluation.paper.board import BoardScore, score_board, watch_board
 from standoff.evaluation.paper.clip import Clip
 from standoff.evaluation.paper.localisation import ClassScore, score_localisation
+from standoff.evaluation.paper.map_only import MapScore, score_map
 from standoff.evaluation.paper.pairs import (
     AFTER,
     AGAINST_BENCHMARK,
@@ -67,6 +68,7 @@ class ClipResult:
         trial: What was tried.
         watched: What the monitor said; None for a clip without a reference object.
         rectification: None without a reference object.
+        map_only: The ground map alone; None without a reference object.
         localisation: By class.
         groups: Of pairs, by class.
         series: Of each pair.
@@ -77,6 +79,7 @@ class ClipResult:
     trial: Trial
     watched: Watched | None = None
     rectification: RectificationScore | None = None
+    map_only: MapScore | None = None
     localisation: tuple[ClassScore, ...] = ()
     groups: tuple[PairGroup, ...] = ()
     series: tuple[PairSeries, ...] = ()
@@ -97,6 +100,7 @@ class ClipResult:
             "trial": self.trial.describe(),
             "paper": [asdict(figure) for figure in self.figures()],
             "rectification": None if self.rectification is None else asdict(self.rectification),
+            "map_only": None if self.map_only is None else asdict(self.map_only),
             "localisation": [asdict(score) for score in self.localisation],
             "pairs": [asdict(group) for group in self.groups],
             "board": None if self.board is None else asdict(self.board),
@@ -124,6 +128,7 @@ def evaluate_clip(clip: Clip, trial: Trial, on_frame: Callable[[], None] | None 
         trial=trial,
         watched=watched,
         rectification=score_rectification(watched, clip.reference),
+        map_only=score_map(clip, watched),
         localisation=score_localisation(clip, watched),
         groups=group_pairs(series),
         series=series,

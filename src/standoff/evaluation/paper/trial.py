@@ -21,18 +21,24 @@ from standoff.stages.ground import ReferenceShape
 from standoff.stages.ground.params import ReferenceMethod
 from standoff.stages.locate.params import Anchor, LocateParams
 
+CameraKnowledge = Literal["file", "unknown"]
+HeightKnowledge = Literal["known", "unknown"]
+
 
 @dataclass(frozen=True, slots=True)
 class Trial:
     """What is tried.
 
     Attributes:
-        method: How the reference's corners are found. With "paper" everything is as printed: the centre of the box,
-            its outlier filter, lens distortion left in the picture. Otherwise the clip's camera file removes it.
+        method: How the reference is found. With "paper" everything is as printed: the centre of the box, its outlier
+            filter, lens distortion left in the picture. Otherwise the clip's camera file removes it.
         detector: "truth", "noisy", a model, or a run of the clip (its folder or its table of detections) to replay.
         anchor: Point of the box that stands for an entity; None: the centre with "paper", standoff's default otherwise.
         box_error: For "noisy".
         seed: For "noisy".
+        camera: "file" removes the lens distortion of the clip's camera file, "unknown" keeps it from the monitor;
+            None: unknown with "paper", else the file.
+        height: Whether the monitor is told how high the reference is, where the clip's settings say it.
     """
 
     method: ReferenceMethod = "paper"
@@ -40,6 +46,8 @@ class Trial:
     anchor: Anchor | None = None
     box_error: BoxError = field(default_factory=BoxError)
     seed: int = 0
+    camera: CameraKnowledge | None = None
+    height: HeightKnowledge = "known"
 
     @property
     def anchor_used(self) -> Anchor:
@@ -48,8 +56,8 @@ class Trial:
 
     @property
     def knows_lens(self) -> bool:
-        """Whether lens distortion is removed."""
-        return self.method != "paper"
+        """Whether the monitor has the camera file."""
+        return self.method != "paper" if self.camera is None else self.camera == "file"
 
     def _detector_name(self) -> str:
         if isinstance(self.detector, str):
@@ -63,7 +71,8 @@ class Trial:
             "method": self.method,
             "anchor": self.anchor_used,
             "detector": self._detector_name(),
-            "lens distortion removed": self.knows_lens,
+            "camera": "file" if self.knows_lens else "unknown",
+            "height of the reference": self.height,
             "outlier filter": "paper",
         }
         if not isinstance(self.detector, Path):
@@ -122,8 +131,9 @@ def settings_for(clip: Clip, trial: Trial) -> Settings:
         )
     # The detector says where the reference is, nobody but the clip which of its corners is the first.
     place = {"box_px": None, "box_time_s": None, "first_corner_px": _first_corner_px(clip, clip.reference)}
+    height = {} if trial.height == "known" else {"height_m": None}
     ground: dict[str, Any] = {
-        "reference": {"params": {"method": trial.method}, **place},
+        "reference": {"params": {"method": trial.method}, **place, **height},
         "camera": str(clip.folder / "camera.yaml") if trial.knows_lens else None,
     }
     overrides: dict[str, Any] = {

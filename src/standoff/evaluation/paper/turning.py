@@ -44,9 +44,18 @@ class Turning:
     def to_site(self, points_m: FloatArray, turn: int) -> FloatArray:
         """Turn (..., 2) positions about the reference's middle so that its corners lie where the truth has them."""
         middle = self._shape_m.mean(axis=0)
+        turned: FloatArray = (points_m - middle) @ self._rotation(turn).T + middle
+        return turned
+
+    def covariance_to_site(self, covariance_m2: FloatArray, turn: int) -> FloatArray:
+        """Turn (..., 2, 2) covariances of such positions."""
+        rotation = self._rotation(turn)
+        turned: FloatArray = rotation @ covariance_m2 @ rotation.T
+        return turned
+
+    def _rotation(self, turn: int) -> FloatArray:
+        middle = self._shape_m.mean(axis=0)
         before = (self._shape_m - middle) @ np.array([1.0, 1.0j])
         # vdot conjugates its first argument: the angle of the sum is that of the best rotation.
         angle = np.angle(np.vdot(before, np.roll(before, -turn)))
-        rotation = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-        turned: FloatArray = (points_m - middle) @ rotation.T + middle
-        return turned
+        return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])

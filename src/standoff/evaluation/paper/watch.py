@@ -12,9 +12,10 @@ import numpy as np
 from standoff.core.boxes import overlaps
 from standoff.core.classes import CLASSES
 from standoff.core.errors import DataError
-from standoff.core.homography import FloatArray
+from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import FrameResult, IntArray, NoGroundMap, TextArray
-from standoff.evaluation.paper.clip import Clip
+from standoff.evaluation.paper.clip import Clip, inside
+from standoff.evaluation.paper.mapped_points import MappedPoints, level_feet_px
 from standoff.evaluation.paper.snapshots import Snapshots
 from standoff.evaluation.paper.trial import Trial, build_monitor, settings_for
 from standoff.evaluation.paper.truth_detector import without_reference
@@ -45,11 +46,13 @@ class Watched:
         xy_m: (F, E, 2) positions, site frame; NaN where `reason` says why.
         reason: (F, E) why there is no position; empty where there is one.
         annotated_m: (F, E, 2) centres of the true boxes through the frame's own map; NaN without a map.
-        true_foot_m: (F, E, 2) the true footprints' centres in the picture through the frame's own map, site frame.
+        true_feet: The true footprints' centres, where the picture shows them, through the frame's own map.
+        level_feet: The same where the picture would show them if the ground were level.
         distance_m: (F, P) after the outlier filter; NaN where not measured.
         no_map: (F,) why there is no map; empty where there is one.
+        carried: (F,) whether the map comes from earlier frames while a corner of the reference is outside the picture.
         scale_m_per_px: (F,) of the map (Eq. 6); NaN without.
-        corner_error_px: (F, 4) of the reference's corners; NaN without a map.
+        corner_error_px: (F, 4) of the reference's corners; NaN without a map, or where the map tells no corners.
         ground_s: (F,) seconds spent on finding the map.
         snapshots: Pictures of some frames.
     """
@@ -59,9 +62,11 @@ class Watched:
     xy_m: FloatArray
     reason: TextArray
     annotated_m: FloatArray
-    true_foot_m: FloatArray
+    true_feet: MappedPoints
+    level_feet: MappedPoints
     distance_m: FloatArray
     no_map: TextArray
+    carried: BoolArray
     scale_m_per_px: FloatArray
     corner_error_px: FloatArray
     ground_s: FloatArray
@@ -77,9 +82,11 @@ class Watched:
             xy_m=np.full((frames, entities, 2), np.nan),
             reason=np.full((frames, entities), "", dtype=object),
             annotated_m=np.full((frames, entities, 2), np.nan),
-            true_foot_m=np.full((frames, entities, 2), np.nan),
+            true_feet=MappedPoints.blank(frames, entities),
+            level_feet=MappedPoints.blank(frames, entities),
             distance_m=np.full((frames, len(clip.pairs)), np.nan),
             no_map=np.full(frames, "", dtype=object),
+            carried=np.zeros(frames, dtype=np.bool_),
             scale_m_per_px=np.full(frames, np.nan),
             corner_error_px=np.full((frames, 4), np.nan),
             ground_s=np.full(frames, np.nan),
@@ -159,6 +166,9 @@ class Notes:
         self.watched = Watched.blank(clip, size_px)
         self.taken = 0
         self._clip, self._true_px = clip, clip.reference.corners_px
+        self._level_px = level_feet_px(clip)
+        self._in_picture = inside(clip.reference, size_px)
+        self._turn = 0
         self._turning = Turning(shape, clip.reference.corners_m)
         self._true_ids = true_ids
 
@@ -196,14 +206,21 @@ class Notes:
             watched.no_map[frame] = ground.reason
             watched.snapshots.take_failure(result.frame, true_px, None, ground.reason)
             return 0
-        error_px, turn = self._turning.compare(ground.anchors_px, true_px)
+        error_px, turn = np.full(4, np.nan), self._turn
+        if len(ground.anchors_px) == len(true_px) and np.isfinite(true_px).all():
+            error_px, turn = self._turning.compare(ground.anchors_px, true_px)
+        self._turn = turn
         watched.corner_error_px[frame] = error_px
+        watched.carried[frame] = ground.age_s > 0.0 and not self._in_picture[frame]
         watched.scale_m_per_px[frame] = ground.scale_m_per_px
         boxes_px = self._clip.box_px[frame]
         centres_px = (boxes_px[:, :2] + boxes_px[:, 2:]) / 2.0
         watched.annotated_m[frame] = self._turning.to_site(ground.to_ground(centres_px)[0], turn)
-        foot_m = self._turning.to_site(ground.to_ground(self._clip.foot_px[frame])[0], turn)
-        watched.true_foot_m[frame] = np.where(np.isnan(boxes_px[:, :1]), np.nan, foot_m)
+        visible = np.isfinite(boxes_px).all(axis=1)
+        for points, points_px in ((watched.true_feet, self._clip.foot_px), (watched.level_feet, self._level_px)):
+            points.take(frame, np.where(visible[:, None], points_px[frame], np.nan), ground, self._turning, turn)
+        if watched.carried[frame]:
+            return turn
         if is_wrong(error_px):
             watched.snapshots.take_failure(result.frame, true_px, ground, WRONG)
         else:

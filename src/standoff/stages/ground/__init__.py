@@ -9,8 +9,12 @@ from standoff.stages.ground.marker_observer import MarkerObserver
 from standoff.stages.ground.marker_place import MarkerPlace
 from standoff.stages.ground.markers import Markers, find_markers
 from standoff.stages.ground.observation import PointObservation
-from standoff.stages.ground.params import ReferenceParams
+from standoff.stages.ground.observed import ObservedGround
+from standoff.stages.ground.params import ObservedParams, ReferenceParams
+from standoff.stages.ground.point_fit import belief_from_points, fit_points
+from standoff.stages.ground.pose_map import map_from_view
 from standoff.stages.ground.reference import ReferenceGround
+from standoff.stages.ground.scale_watch import ScaleWatch
 from standoff.stages.ground.shape import ReferenceShape
 from standoff.stages.ground.survey_file import load_survey
 from standoff.stages.ground.surveyed import SurveyedGround
@@ -28,19 +32,25 @@ __all__ = [
     "MarkerObserver",
     "MarkerPlace",
     "Markers",
+    "ObservedGround",
+    "ObservedParams",
     "PointObservation",
     "ReferenceGround",
     "ReferenceParams",
     "ReferenceShape",
+    "ScaleWatch",
     "SurveyedGround",
     "TelemetryPose",
     "Unmapped",
+    "belief_from_points",
     "calibrate",
     "calibrate_views",
     "find_corners",
     "find_markers",
+    "fit_points",
     "load_camera",
     "load_survey",
+    "map_from_view",
     "marker_pattern",
     "read_boards",
     "save_camera",

@@ -13,6 +13,7 @@ from standoff.core.errors import GroundError
 from standoff.core.homography import FloatArray
 from standoff.core.pose import CHANGES
 from standoff.core.types import CameraMotion, Detections, Frame, GroundMap, ImageArray, NoCameraMotion, NoGroundMap
+from standoff.stages.ground.basis import BETTER_REFERENCE, lens_text, reference_basis
 from standoff.stages.ground.params import ReferenceParams
 from standoff.stages.ground.pose_filter import PoseFilter
 from standoff.stages.ground.pose_map import map_from_view
@@ -25,9 +26,8 @@ from standoff.stages.ground.turned import turned_like
 from standoff.stages.ground.where import NOT_SEEN, GivenPlace, detected_box
 
 UNSURE = "the reference has been out of sight too long"
-MOVED = "the reference is not where the rest of the picture says"
 
-_LEAST_REACH_PX, _MOST_REACH_PX = 3.0, 8.0
+_LEAST_REACH_PX, _MOST_REACH_PX = 5.0, 8.0
 _REACH_SIGMAS = 4.0
 _MIN_SUPPORT = 0.4
 """Of the outline that should show, so much must be seen for the reference to count as seen in a frame."""
@@ -89,6 +89,8 @@ class FusedGround:
         camera = self._camera if self._camera is not None else self._given_camera
         return {
             "method": self._method,
+            "basis": f"{reference_basis(self._shape)}, {lens_text(camera)}",
+            "better": BETTER_REFERENCE,
             "corners_m": self._shape.corners_m.tolist(),
             "height_m": self._given_height_m,
             "params": asdict(self._params),
@@ -130,8 +132,8 @@ class FusedGround:
         if not self._remember:
             self._filter = PoseFilter()
         carried = self._filter.predict(frame.time_s, motion)
-        self._carry_box(motion, carried)
-        seen = self._filter.now is not None and self._look(gray, frame.time_s, carried)
+        self._carry_box(carried)
+        seen = self._filter.now is not None and self._look(gray, carried)
         if not seen:
             reason = self._search(gray, frame.time_s, detections, carried)
             if isinstance(reason, NoGroundMap):
@@ -155,7 +157,7 @@ class FusedGround:
             self._size_px = size_px
         return self._camera
 
-    def _look(self, gray: ImageArray, time_s: float, carried: bool) -> bool:
+    def _look(self, gray: ImageArray, carried: bool) -> bool:
         """Look for the reference where it should be; return whether it was seen there and believed."""
         now = self._filter.now
         assert now is not None
@@ -175,25 +177,22 @@ class FusedGround:
 
     def _search(self, gray: ImageArray, time_s: float, detections: Detections, carried: bool) -> NoGroundMap | None:
         """Find the reference anew where it is known or detected to be; None where there is something to map with."""
-        now = self._filter.now
         box = self._box_now(time_s, detections)
         if isinstance(box, NoGroundMap):
             return None if carried else box
-        if carried and now is not None and not self._contradicted(now.state, box, time_s):
+        if carried and not self._contradicted(box, time_s):
             return None
-        camera, height = self._known(time_s)
+        camera, height = self._known()
         found = search_solid(gray, box, self._shape, camera, height)
         if isinstance(found, NoGroundMap):
             return None if carried else found
         self._begin(found, time_s)
         return None
 
-    def _contradicted(self, state: SolidState, box: FloatArray, time_s: float) -> bool:
-        """Return whether the detector has for a while seen the reference elsewhere than where it is believed to be."""
-        outline = self._outline_px(state)
-        middle = outline.mean(axis=0)
-        inside = bool(np.isfinite(middle).all() and (middle >= box[:2]).all() and (middle <= box[2:]).all())
-        if inside:
+    def _contradicted(self, box: FloatArray, time_s: float) -> bool:
+        """Return whether the reference has for a while been seen only elsewhere than where it is believed to be."""
+        middle = None if self._box is None else (self._box[:2] + self._box[2:]) / 2.0
+        if middle is None or ((middle >= box[:2]) & (middle <= box[2:])).all():
             self._refused_since_s = None
             return False
         if self._refused_since_s is None:
@@ -216,7 +215,7 @@ class FusedGround:
         if np.isfinite(outline).all():
             self._box = np.concatenate([outline.min(axis=0), outline.max(axis=0)])
 
-    def _known(self, time_s: float) -> tuple[CameraPrior, HeightPrior]:
+    def _known(self) -> tuple[CameraPrior, HeightPrior]:
         """Return what earlier frames have told of the lens and of the height."""
         camera = self._prior_for(self._size_px) if self._size_px is not None else None
         assert camera is not None
@@ -231,12 +230,11 @@ class FusedGround:
     def _box_now(self, time_s: float, detections: Detections) -> FloatArray | NoGroundMap:
         if self._place.box_xyxy_px is not None:
             return self._place.box_at(time_s) if self._box is None else self._box
-        detected = detected_box(detections, self._params.min_score)
-        if detected is not None:
-            return detected
-        return NoGroundMap(NOT_SEEN)
+        near = None if self._box is None else detected_box(detections, self._params.min_score, self._box)
+        detected = near if near is not None else detected_box(detections, self._params.min_score)
+        return NoGroundMap(NOT_SEEN) if detected is None else detected
 
-    def _carry_box(self, motion: CameraMotion | NoCameraMotion, carried: bool) -> None:
+    def _carry_box(self, carried: bool) -> None:
         now = self._filter.now
         if carried and now is not None:
             outline = self._outline_px(now.state)

@@ -49,6 +49,11 @@ class MarkerObserver:
         self._family: MarkerFamily = family
         self.reset()
 
+    @property
+    def places(self) -> tuple[MarkerPlace, ...]:
+        """Which markers lie where."""
+        return tuple(self._places.values())
+
     def reset(self) -> None:
         """Forget where markers were seen: another film begins."""
         self._last_px: dict[int, FloatArray] = {}

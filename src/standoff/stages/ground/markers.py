@@ -118,4 +118,6 @@ def _detector(family: MarkerFamily, least_perimeter_share: float) -> Any:  # noq
     settings.perspectiveRemoveIgnoredMarginPerCell = 0.25
     settings.errorCorrectionRate = 1.01
     settings.minDistanceToBorder = 1
+    # By default the sheet's own edge counts as the same candidate, and may be the one that is kept.
+    settings.minMarkerDistanceRate = 0.05
     return cv2.aruco.ArucoDetector(marker_dictionary(family), settings)

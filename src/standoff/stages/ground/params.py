@@ -86,3 +86,17 @@ class ReferenceParams:
         shortest, longest = self.focal_widths
         if not 0 < shortest < longest:
             raise ValueError(f"focal_widths must be two rising numbers above 0, not {shortest:g} and {longest:g}")
+
+
+@dataclass(frozen=True, slots=True)
+class ObservedParams:
+    """What `ObservedGround` may measure by, and when a map is none."""
+
+    telemetry: Annotated[bool, Doc("Whether the drone's telemetry may say where the camera is.")] = True
+    sizes: Annotated[bool, Doc("Whether known sizes of people may, where nothing better is there.")] = True
+    size_sigma: Annotated[
+        float, Interval(ge=0, le=0.2), Doc("Standard error of a printed marker's stated size, as a share of it.")
+    ] = 0.005
+    max_scale_sigma: Annotated[
+        float, Interval(gt=0, le=1), Doc("A map whose lengths are less sure than this share is no map.")
+    ] = 0.3

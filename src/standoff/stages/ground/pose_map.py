@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from standoff.core.homography import FloatArray, invert
+from standoff.core.homography import FloatArray, invert, point_jacobian
 from standoff.core.pose import CHANGES, View
 from standoff.core.types import GroundMap
 
@@ -66,3 +66,38 @@ def _entries(view: View) -> FloatArray:
     matrix = invert(view.plane_to_pinhole())
     entries: FloatArray = (matrix / np.linalg.norm(matrix)).ravel()
     return entries
+
+
+_AT = np.array([[0.45, 0.6], [0.55, 0.6], [0.5, 0.52], [0.5, 0.68]])
+"""Ends of a stretch of ground to the side and of one away from the camera, as shares of the picture."""
+
+
+def length_sigma(view: View, covariance: FloatArray) -> float:
+    """Return the relative standard error of lengths in the middle of the picture, in the worse direction.
+
+    Args:
+        view: The camera.
+        covariance: (8, 8) of a change of the view.
+
+    Returns:
+        Infinite where no ground is seen there.
+    """
+    points_m = np.column_stack([view.to_plane(_AT * [view.camera.width_px, view.camera.height_px]), np.zeros(len(_AT))])
+    if not np.isfinite(points_m).all():
+        return np.inf
+    _, by_view, by_point = view.project_with_jacobians(points_m)
+    # A pixel stays where it is, so its place on the ground moves.
+    by_change = -np.linalg.solve(by_point[:, :, :2], by_view)
+    worst = 0.0
+    for start, end in ((0, 1), (2, 3)):
+        apart_m = (points_m[end] - points_m[start])[:2]
+        longer = apart_m @ (by_change[end] - by_change[start]) / (apart_m @ apart_m)
+        worst = max(worst, float(longer @ covariance @ longer))
+    return float(np.sqrt(worst))
+
+
+def middle_scale_m_per_px(view: View) -> float:
+    """Return metres per undistorted pixel a little below the middle of the picture; NaN if no ground is seen there."""
+    point_px = view.camera.undistort(np.array([[view.camera.width_px * 0.5, view.camera.height_px * 0.6]]))
+    jacobian = point_jacobian(invert(view.plane_to_pinhole()), point_px)[0]
+    return float(np.sqrt(abs(np.linalg.det(jacobian))))

@@ -153,6 +153,36 @@ def scale_from_sizes(
     return SizeScale(float(np.exp(mean)), float(np.hypot(1.0 / np.sqrt(weight.sum()), lens_sigma)), entities)
 
 
+def size_ratios(
+    ground: GroundMap | View, xyxy_px: FloatArray, class_id: IntArray, camera: CameraPrior | None = None
+) -> tuple[FloatArray, FloatArray]:
+    """Compare each box by itself, as `scale_from_sizes` does all together.
+
+    Args:
+        ground: The map; of a `GroundMap` the camera's pose is derived.
+        xyxy_px: (N, 4) boxes as seen in the picture.
+        class_id: (N,) ids of `CLASSES`.
+        camera: The lens, where the map knows none; None: any drone's.
+
+    Returns:
+        (N,) logarithms of apparent to expected size, NaN where nothing can be said, and (N,) their standard errors.
+
+    Raises:
+        GroundError: The map is not one that a camera above the ground could have.
+    """
+    view, lens_sigma = _view_of(ground, camera)
+    log_ratio, variance = np.full(len(xyxy_px), np.nan), np.full(len(xyxy_px), lens_sigma**2)
+    usable = _seen_whole(view, xyxy_px)
+    for kind in CLASSES:
+        mine = usable & (class_id == kind.id) & (kind.height_m > 0)
+        if mine.any():
+            log_ratio[mine] = _log_ratios(view, xyxy_px[mine], kind)
+            shared = CLASS_SIGMA.get(kind.name, _OTHER_CLASS_SIGMA)
+            size_px = xyxy_px[mine, 3] - xyxy_px[mine, 1]
+            variance[mine] += shared**2 + _ENTITY_SIGMA[kind.role] ** 2 + (_LOOSE_PX / size_px) ** 2
+    return log_ratio, np.sqrt(variance)
+
+
 def _view_of(ground: GroundMap | View, camera: CameraPrior | None) -> tuple[View, float]:
     """Return the camera's pose, and what not knowing its lens adds to the log ratio's standard error."""
     if isinstance(ground, View):

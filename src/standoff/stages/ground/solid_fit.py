@@ -30,6 +30,10 @@ _PATCHY_PX = 4.0
 _WORTH_SETTLING_PX, _DOUBT_LEFT = 0.2, 0.5
 """A narrow side's doubt of less than this is not worth a decision, and after one so much of it remains."""
 
+_STRIP_BLUR_PX, _STRIP_SHARE, _STRIP_RATIO, _STRIP_DOUBT = 2.5, 0.6, 0.3, 0.35
+"""A strip: two edges this near to each other along so much of the length, the fainter one with so much of the other's
+steepness. Sharpening makes such pairs, too, but fainter ones."""
+
 _LEAST_SHARE = 0.35
 """An edge of which less than this share is found contributes nothing: what was found is something else."""
 
@@ -124,7 +128,7 @@ def fit_solid(
 def outline_support(picture: Blurred, shape: ReferenceShape, state: SolidState) -> tuple[EdgeSamples, FloatArray]:
     """Return a state's visible edges, and (E,) the share of each that a picture supports, without fitting anything."""
     samples = sample_edges(shape, state)
-    looks = look_across(picture, samples, _LEAST_GATE_PX)
+    samples, looks = _paired(samples, look_across(picture, samples, _LEAST_GATE_PX))
     residual, _, found = _associated(samples, looks, state, _LEAST_GATE_PX)
     return samples, _support(samples, looks, residual, found)
 
@@ -139,6 +143,33 @@ def _step(samples: EdgeSamples, looks: Looks, state: SolidState, prior: Belief, 
     pull -= prior.information @ state.change_from(prior.state)
     change = np.asarray(np.linalg.solve(information + prior.information, pull), dtype=np.float64)
     return change if np.isfinite(change).all() else None
+
+
+def _paired(samples: EdgeSamples, looks: Looks) -> tuple[EdgeSamples, Looks]:
+    """Take an edge that shows as a narrow bright or dark strip as such: what is sure is the middle of the strip.
+
+    Blur pushes the two edges of a strip apart, each by up to a pixel, and leaves their middle where it is. Where a
+    narrow side is expected, that is its middle; elsewhere the edge may be on either side of the strip.
+    """
+    offset_px, steepness = looks.offset_px.copy(), looks.steepness.copy()
+    doubt_px = samples.doubt_px.copy()
+    first, second = offset_px[:, 0], offset_px[:, 1]
+    with np.errstate(invalid="ignore"):
+        apart_px = np.abs(first - second)
+        strip = apart_px <= 2.0 * samples.doubt_px[samples.edge] + _STRIP_BLUR_PX
+        strip &= -steepness[:, 1] * np.sign(steepness[:, 0]) >= _STRIP_RATIO * np.abs(steepness[:, 0])
+    count = len(samples.length_px)
+    shares = np.bincount(samples.edge, strip, count) / np.maximum(np.bincount(samples.edge, minlength=count), 1)
+    for edge in np.flatnonzero(shares >= _STRIP_SHARE):
+        mine = samples.edge == edge
+        both = mine & strip
+        expected = samples.doubt_px[edge] > _WORTH_SETTLING_PX
+        doubt_px[edge] = _WORTH_SETTLING_PX if expected else _STRIP_DOUBT * float(np.median(apart_px[both]))
+        falling = np.where(first > second, steepness[:, 0], steepness[:, 1])[both]
+        middle = ((first + second) / 2.0)[both]
+        offset_px[mine], steepness[mine] = np.nan, 0.0
+        offset_px[both, 0], steepness[both, 0] = middle, falling
+    return replace(samples, doubt_px=doubt_px), replace(looks, offset_px=offset_px, steepness=steepness)
 
 
 def _settled(samples: EdgeSamples, looks: Looks, state: SolidState) -> EdgeSamples:

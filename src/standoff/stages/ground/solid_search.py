@@ -20,6 +20,7 @@ from standoff.core.types import ImageArray, NoGroundMap
 from standoff.stages.ground.edges import between_pixels, canny, sobel_gradients
 from standoff.stages.ground.oriented import likely_quadrilaterals, noise_thresholds
 from standoff.stages.ground.outline import BOX_OUTSIDE, TOO_FEW_EDGES, undistorted_box
+from standoff.stages.ground.point_fit import views_of_plane
 from standoff.stages.ground.quadrilateral import NO_QUADRILATERAL, ORDERS
 from standoff.stages.ground.shape import ReferenceShape
 from standoff.stages.ground.solid import HEIGHT, STATE, SolidState
@@ -42,7 +43,7 @@ _MAX_ROLL_RAD = np.deg2rad(30.0)
 _MIN_PITCH_RAD = np.deg2rad(5.0)
 _BARE_COST, _ROLL_COST, _PATCHY = 0.45, 0.1, 0.33
 _REFINED = 4
-_FIT_PX = 4.0
+_FIT_PX = 5.0
 _RIVAL_SCORE, _RIVAL_PX = 0.9, 4.0
 _MIN_SIDE_SUPPORT, _MIN_MEAN_SUPPORT, _MIN_OTHER_SUPPORT = 0.5, 0.8, 0.85
 """So much of the sides must be seen when nothing else says that the reference is there."""
@@ -220,20 +221,9 @@ def _states(outline: FloatArray, shape: ReferenceShape, camera: Camera, height: 
 
 def _views(corners_px: FloatArray, shape: ReferenceShape, camera: Camera, limit_px: float) -> Iterator[View]:
     """Give the views from above, nearly level, from which the shape at z = 0 has these corners."""
-    places = np.column_stack([shape.corners_m, np.zeros(len(shape.corners_m))])
-    middle = places.mean(axis=0)
-    found, turns, shifts, errors = cv2.solvePnPGeneric(
-        places - middle, corners_px[:, None], camera.matrix, None, flags=cv2.SOLVEPNP_IPPE
-    )
-    for k in range(found):
-        if float(np.ravel(errors[k])[0]) > limit_px:
-            continue
-        rotation = cv2.Rodrigues(turns[k])[0]
-        left, _, right = np.linalg.svd(rotation)
-        rotation = left @ right
-        view = View(camera, middle - rotation.T @ shifts[k].ravel(), rotation)
+    for view in views_of_plane(corners_px, shape.corners_m, camera, limit_px):
         roll, pitch = _roll_and_pitch(view)
-        if view.position_m[2] > 0 and abs(roll) < _MAX_ROLL_RAD and pitch > _MIN_PITCH_RAD:
+        if abs(roll) < _MAX_ROLL_RAD and pitch > _MIN_PITCH_RAD:
             yield view
 
 

@@ -221,6 +221,8 @@ def _describe(fit: SurveyFit, surveyed: GroundMap, names: Sequence[str], point_s
         warnings.append("the metres are mirrored: seen from above, y must lie to the left of x")
     return {
         "method": "surveyed",
+        "basis": f"{len(names)} surveyed points, {length_m.max():.2g} m off at the most",
+        "better": "more points, spread over the whole picture, make it better",
         "image_size_px": list(surveyed.image_size_px),
         "lens_distortion_removed": surveyed.camera is not None,
         "rms_px": float(np.sqrt((length_px**2).mean())),

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from standoff.core.types import CameraMotion, Detections, Frame, NoCameraMotion, NoGroundMap
+from standoff.stages.ground.basis import HELP
 
 
 class Unmapped:
     """Say in every frame that no ground is configured."""
 
     def __init__(self) -> None:
-        self.description = {"method": "none"}
+        self.description = {"method": "none", "basis": "nothing: no ground is configured", "better": HELP}
 
     def update(self, frame: Frame, detections: Detections, motion: CameraMotion | NoCameraMotion) -> NoGroundMap:
         """Return the reason; frame, detections and motion play no part."""

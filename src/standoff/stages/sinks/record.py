@@ -5,7 +5,7 @@ from __future__ import annotations
 import platform
 import time
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -46,9 +46,16 @@ class RecordSink:
         path: The file, usually `run.json`.
         descriptions: What only the caller knows (resolved configuration, source, model, ground), kept as
             given; what JSON has no word for becomes text, and a number that is not finite null.
+        at_close: Gives those anew that are only known after the last frame; None: nothing is.
     """
 
-    def __init__(self, path: Path | str, descriptions: Mapping[str, Any]) -> None:
+    def __init__(
+        self,
+        path: Path | str,
+        descriptions: Mapping[str, Any],
+        at_close: Callable[[], Mapping[str, Any]] | None = None,
+    ) -> None:
+        self._at_close = at_close
         self._path = Path(path)
         self._head = {"started_at": datetime.now(UTC), "versions": library_versions(), **descriptions}
         self._started = time.monotonic()
@@ -110,6 +117,7 @@ class RecordSink:
             "status": outcome.status,
             "message": outcome.message,
             **self._head,
+            **(self._at_close() if self._at_close is not None else {}),
             "finished_at": datetime.now(UTC),
             "wall_s": round(wall_s, 3),
             "frames_per_s": round(self._counts["frames"] / wall_s, 2) if wall_s > 0 else None,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from datetime import UTC, datetime
 from importlib.resources import files
 from pathlib import Path
@@ -38,6 +38,7 @@ class ReportSink:
             shown as given.
         warning_gap_m: Gap (distance less both action radii) below which the hazard stage warns, to be drawn;
             below 0 the circles touch, which is danger.
+        at_close: Gives those descriptions anew that are only known after the last frame; None: nothing is.
     """
 
     def __init__(
@@ -47,7 +48,9 @@ class ReportSink:
         descriptions: Mapping[str, Any] | None = None,
         *,
         warning_gap_m: float = 1.0,
+        at_close: Callable[[], Mapping[str, Any]] | None = None,
     ) -> None:
+        self._at_close = at_close
         self._path, self._warning_gap_m = Path(path), warning_gap_m
         self._descriptions = dict(descriptions or {})
         self._summary = RunSummary(params or ReportParams())
@@ -60,6 +63,8 @@ class ReportSink:
         """Write the page; its name appears when it is whole."""
         for event in outcome.hazards:
             self._summary.take_event(event)
+        if self._at_close is not None:
+            self._descriptions |= self._at_close()
         partial = partial_path(self._path)
         partial.write_text(render(self._summary, outcome, self._descriptions, self._warning_gap_m), encoding="utf-8")
         partial.replace(self._path)
@@ -91,6 +96,8 @@ def render(summary: RunSummary, outcome: Outcome, descriptions: Mapping[str, Any
         plan_chart=Markup(plan_chart(summary)),
         moments=[(moment, _data_uri(moment.jpeg())) for moment in shown],
         warnings=descriptions.get("warnings", ()),
+        basis=(ground := descriptions.get("ground") or {}).get("basis", ""),
+        better=ground.get("better", ""),
         descriptions={heading: list(_flat(plain(value))) for heading, value in descriptions.items() if value},
         distance_text=distance_text,
     )

@@ -1,0 +1,72 @@
+"""What a run's metres rest on, in words, and what would make them better."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from standoff.core.camera import CameraPrior
+from standoff.stages.ground.marker_place import MarkerPlace
+from standoff.stages.ground.shape import ReferenceShape
+
+_EQUAL = 1e-6
+
+HELP = "a printed marker, a reference object of known size or the drone's log beside the film would help"
+
+
+def lens_text(camera: CameraPrior | None) -> str:
+    """Say where the lens is from."""
+    return f"its camera's lens from {_origin(camera)}"
+
+
+def _origin(camera: CameraPrior | None) -> str:
+    if camera is None:
+        return "a drone's usual lens"
+    return "a camera file" if camera.origin == "camera file" else camera.origin
+
+
+def reference_basis(shape: ReferenceShape) -> str:
+    """Say which reference object, with its size.
+
+    >>> reference_basis(ReferenceShape.square(2.89)), reference_basis(ReferenceShape.rectangle(2.4, 3.0))
+    ('a square reference of 2.89 m', 'a rectangular reference of 2.4 by 3 m')
+    """
+    corners = shape.corners_m
+    sides = np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1)
+    diagonals = np.linalg.norm(corners[2:] - corners[:2], axis=1)
+    if np.ptp(diagonals) > _EQUAL or np.abs(sides[:2] - sides[2:]).max() > _EQUAL:
+        return f"a reference with sides of {', '.join(f'{side:.4g}' for side in sides)} m"
+    if np.ptp(sides) < _EQUAL:
+        return f"a square reference of {sides[0]:.4g} m"
+    return f"a rectangular reference of {sides[0]:.4g} by {sides[1]:.4g} m"
+
+
+def markers_basis(places: Sequence[MarkerPlace]) -> str:
+    """Say which markers, with their sizes.
+
+    >>> markers_basis([MarkerPlace.lying(0, 1.2)])
+    'a printed marker of 1.2 m'
+    """
+    sizes = sorted({round(place.size_m, 3) for place in places})
+    text = " and ".join(f"{size:g}" for size in sizes)
+    return f"a printed marker of {text} m" if len(places) == 1 else f"{len(places)} printed markers of {text} m"
+
+
+BETTER_REFERENCE = "a larger reference, its height above the ground, and a camera file make it better"
+
+BETTER: Mapping[str, str] = {
+    "markers": "a camera file, and a second marker far from the first, make it better",
+    "telemetry": "a printed marker or a reference object of known size makes it better",
+    "sizes": "a printed marker, a reference object of known size or the drone's log makes it better",
+}
+"""By what a map was found."""
+
+
+def expectation(sigma: float) -> str:
+    """Say how far off lengths will be, by their relative standard error.
+
+    >>> expectation(0.117)
+    'expect 12 %'
+    """
+    return f"expect {max(100.0 * sigma, 1.0):.0f} %"

@@ -1,0 +1,142 @@
+"""Watches whether a map's metres are metres: people and machines seen through it must have their usual sizes."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from standoff.core.camera import CameraPrior
+from standoff.core.classes import Role, class_ids
+from standoff.core.errors import GroundError
+from standoff.core.protocols import AnyGround, AnyMotion, Ground
+from standoff.core.types import Detections, Frame, GroundMap, NoGroundMap
+from standoff.stages.ground.size_scale import REFUSAL_FACTOR, WARNING_FACTOR, size_ratios, unit_hint
+
+_EVERY_S = 0.5
+_LEAST_SCORE = 0.6
+_MOST_SIZES = 120
+"""Of people, and of machines: what was seen last counts."""
+
+_FEWEST_ENTITIES, _FEWEST_TO_WARN, _FEWEST_TO_REFUSE = 2, 3, 8
+_AGREED_SHARE = 0.75
+"""So many of the sizes must be off by a factor, in one direction: some clutter passes for people, never so much."""
+
+_GROUPS = {"people": Role.PERSON, "machines": Role.EQUIPMENT}
+
+
+@dataclass(slots=True)
+class _Sizes:
+    """What was seen of people, or of machines: logarithms of how many times too large, and how many at once."""
+
+    logs: deque[float]
+    sigmas: deque[float]
+    at_once: int = 0
+
+    def log_factor(self) -> float:
+        """Return the factor that most agree on, as a logarithm; 0 where they do not agree on a direction."""
+        high, low = np.quantile(self.logs, [_AGREED_SHARE, 1.0 - _AGREED_SHARE])
+        nearest = float(low if low > 0 else high if high < 0 else 0.0)
+        # What all of a class or a crew share does not average out: at least two standard errors must remain.
+        return nearest if abs(float(np.median(self.logs))) > 2.0 * float(np.median(self.sigmas)) else 0.0
+
+
+class ScaleWatch:
+    """A ground stage around another one, which is told when its metres cannot be.
+
+    Sizes off by a factor of 1.6 are a warning; by a factor of 4 there is no map. Both need sizes of several people or
+    machines that agree; where people and machines are both seen, both have to be off.
+
+    Args:
+        inner: What finds the map.
+        camera: The lens, where a map knows none; None: any drone's.
+    """
+
+    def __init__(self, inner: Ground, camera: CameraPrior | None = None) -> None:
+        self.inner = inner
+        self._camera = camera
+        self._sizes = {name: _Sizes(deque(maxlen=_MOST_SIZES), deque(maxlen=_MOST_SIZES)) for name in _GROUPS}
+        self._sampled_s = -np.inf
+        self._refusal = ""
+        self._worst_log = 0.0
+
+    @property
+    def description(self) -> dict[str, Any]:
+        """The inner stage's, and what sizes say of its metres."""
+        inner = dict(getattr(self.inner, "description", {}))
+        inner["warnings"] = [*inner.get("warnings", ()), *self._warnings()]
+        seen = {name: len(sizes.logs) for name, sizes in self._sizes.items() if sizes.logs}
+        ratios = {name: float(np.exp(np.median(sizes.logs))) for name, sizes in self._sizes.items() if sizes.logs}
+        return {**inner, "scale_watch": {"sizes_seen": seen, "times_too_large": ratios}}
+
+    def check_size(self, size_px: tuple[int, int]) -> None:
+        """Make sure that the inner stage fits pictures of a size (width, height), before the first frame.
+
+        Raises:
+            GroundError: It does not.
+        """
+        check = getattr(self.inner, "check_size", None)
+        if check is not None:
+            check(size_px)
+
+    def update(self, frame: Frame, detections: Detections, motion: AnyMotion) -> AnyGround:
+        """Return the inner stage's map, unless sizes say that its metres are none."""
+        ground = self.inner.update(frame, detections, motion)
+        if isinstance(ground, GroundMap):
+            if len(detections) and not 0.0 <= frame.time_s - self._sampled_s < _EVERY_S:
+                self._sampled_s = frame.time_s
+                self._take(ground, detections)
+                self._judge()
+            if self._refusal:
+                return NoGroundMap(self._refusal)
+        return ground
+
+    def _take(self, ground: GroundMap, detections: Detections) -> None:
+        sure = detections[detections.score >= _LEAST_SCORE]
+        try:
+            log_ratio, sigma = size_ratios(ground, sure.xyxy_px, sure.class_id, self._camera)
+        except GroundError:
+            # A map that is no camera's has no sizes of upright things; its own stage says so.
+            return
+        for name, role in _GROUPS.items():
+            mine = np.isin(sure.class_id, class_ids(role)) & np.isfinite(log_ratio)
+            sizes = self._sizes[name]
+            sizes.logs.extend(log_ratio[mine].tolist())
+            sizes.sigmas.extend(sigma[mine].tolist())
+            sizes.at_once = max(sizes.at_once, int(mine.sum()))
+
+    def _judge(self) -> None:
+        log_factor, seen, at_once, names = self._agreed()
+        enough = at_once >= _FEWEST_ENTITIES
+        if enough and seen >= _FEWEST_TO_WARN and abs(log_factor) >= np.log(WARNING_FACTOR):
+            self._worst_log = max(self._worst_log, log_factor, key=abs)
+        if not (enough and seen >= _FEWEST_TO_REFUSE and abs(log_factor) >= np.log(REFUSAL_FACTOR)):
+            self._refusal = ""
+        elif not self._refusal:
+            # The words stay the same as long as the cause does, so that it can be counted.
+            self._refusal = _clause(log_factor, names)
+
+    def _agreed(self) -> tuple[float, int, int, str]:
+        """Return the factor's logarithm, how many sizes it rests on, of how many at once at least, and whose."""
+        groups = {name: sizes for name, sizes in self._sizes.items() if len(sizes.logs)}
+        if not groups:
+            return 0.0, 0, 0, ""
+        factors = [sizes.log_factor() for sizes in groups.values()]
+        log_factor = min(factors, key=abs) if min(factors) > 0 or max(factors) < 0 else 0.0
+        seen = sum(len(sizes.logs) for sizes in groups.values())
+        return log_factor, seen, sum(sizes.at_once for sizes in groups.values()), " and ".join(groups)
+
+    def _warnings(self) -> list[str]:
+        if not self._worst_log:
+            return []
+        return [f"seen through the ground map, {_clause(self._worst_log, self._agreed()[3])}"]
+
+
+def _clause(log_factor: float, names: str) -> str:
+    times = float(np.exp(abs(log_factor)))
+    rounded = f"{times:.1f}" if times < 10 else f"{float(f'{times:.1g}'):,.0f}".replace(",", " ")
+    unit = unit_hint(float(np.exp(log_factor)))
+    cause = f"probably {unit}" if unit else "check the lengths that the ground is measured by"
+    return f"{names} look {rounded} times too {'large' if log_factor > 0 else 'small'}: {cause}"

@@ -1,0 +1,85 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from drawn_solid import box_around, drawn, lens, random_state, top_px
+from tolerances import SOLID_PX
+
+from standoff.core.camera import CameraPrior
+from standoff.core.homography import FloatArray
+from standoff.core.types import NoGroundMap
+from standoff.stages.ground import ReferenceShape
+from standoff.stages.ground.solid import SolidState
+from standoff.stages.ground.solid_search import Found, HeightPrior, search_solid
+
+SQUARE = ReferenceShape.square(2.89)
+RECTANGLE = ReferenceShape.rectangle(1.8, 3.2)
+QUADRILATERAL = ReferenceShape.from_sides((4.4, 2.6, 2.6, 3.0), diagonal_m=4.4)
+SHAPES = (SQUARE, RECTANGLE, QUADRILATERAL)
+CAMERA = lens(k1=-0.04)
+HEIGHT_M = 0.4
+
+
+def _searched(shape: ReferenceShape, state: SolidState, seed: int, box: FloatArray, **drawing: object) -> object:
+    picture = drawn(shape, state, seed=seed, noise=4.0, **drawing)  # type: ignore[arg-type]
+    return search_solid(picture, box, shape, CameraPrior.calibrated(CAMERA), HeightPrior.known(HEIGHT_M))
+
+
+def _off_px(found: Found, shape: ReferenceShape, state: SolidState) -> float:
+    """Return how far the top's corners are off, whichever of a symmetrical shape's corners is the first."""
+    expected, seen = top_px(shape, state), top_px(shape, found.fit.state)
+    ways = [np.roll(expected, -turn, axis=0) for turn in shape.turns_onto_itself()]
+    return min(float(np.linalg.norm(seen - way, axis=1).max()) for way in ways)
+
+
+def _crooked(box: FloatArray, seed: int) -> FloatArray:
+    """Return a box whose sides are each off by up to a tenth of its size; corners may be cut."""
+    size = box[2:] - box[:2]
+    return np.asarray(box + np.random.default_rng([seed, 2]).uniform(-0.1, 0.1, 4) * np.tile(size, 2))
+
+
+@pytest.mark.parametrize("shape", SHAPES, ids=["square", "rectangle", "quadrilateral"])
+def test_the_reference_is_found_in_a_crooked_box_with_a_shadow_beside_it(shape: ReferenceShape) -> None:
+    found = []
+    for seed in range(5):
+        state = random_state(np.random.default_rng(seed), shape, CAMERA, HEIGHT_M)
+        box = _crooked(box_around(shape, state), seed)
+        one = _searched(shape, state, seed, box, sun_m=(0.5, 0.3))
+        if isinstance(one, Found):
+            found.append(_off_px(one, shape, state))
+    assert len(found) >= 4
+    assert max(found) < SOLID_PX
+
+
+def test_what_is_believed_is_never_wrong() -> None:
+    missed = 0
+    for seed in range(40):
+        shape = SHAPES[seed % 3]
+        rng = np.random.default_rng(100 + seed)
+        state = random_state(rng, shape, CAMERA, HEIGHT_M)
+        sun_m = None if seed % 4 == 0 else (float(rng.uniform(-0.8, 0.8)), float(rng.uniform(-0.8, 0.8)))
+        found = _searched(shape, state, seed, _crooked(box_around(shape, state), seed), sun_m=sun_m)
+        if not isinstance(found, Found):
+            missed += 1
+            continue
+        assert _off_px(found, shape, state) < 2.0 * SOLID_PX, f"seed {seed}"
+    assert missed <= 8
+
+
+def test_plain_ground_and_a_box_outside_the_picture_have_no_reference() -> None:
+    state = random_state(np.random.default_rng(1), SQUARE, CAMERA, HEIGHT_M)
+    assert isinstance(_searched(SQUARE, state, 1, box_around(SQUARE, state), solid=False), NoGroundMap)
+    outside = np.array([-300.0, -300.0, -200.0, -200.0])
+    assert isinstance(_searched(SQUARE, state, 1, outside), NoGroundMap)
+
+
+def test_a_solid_of_quite_another_shape_is_not_taken_for_the_reference() -> None:
+    state = random_state(np.random.default_rng(2), SQUARE, CAMERA, HEIGHT_M)
+    long = ReferenceShape.rectangle(0.7, 3.2)
+    found = _searched(long, state, 2, box_around(long, state))
+    assert isinstance(found, Found)
+    picture = drawn(long, state, noise=4.0)
+    wrong = search_solid(
+        picture, box_around(long, state), SQUARE, CameraPrior.calibrated(CAMERA), HeightPrior.known(HEIGHT_M)
+    )
+    assert isinstance(wrong, NoGroundMap)
