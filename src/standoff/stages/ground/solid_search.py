@@ -17,7 +17,7 @@ import numpy as np
 from standoff.core.camera import Camera, CameraPrior
 from standoff.core.homography import FloatArray
 from standoff.core.pose import LENS, SHIFT, TURN, View
-from standoff.core.types import ImageArray, IntArray, NoGroundMap
+from standoff.core.types import ImageArray, NoGroundMap
 from standoff.stages.ground.edges import between_pixels, canny, sobel_gradients
 from standoff.stages.ground.lines import line_through
 from standoff.stages.ground.oriented import likely_quadrilaterals, noise_thresholds
@@ -151,7 +151,7 @@ def _search(
         prior = _prior(states[k], camera, height)
         fit = fit_solid(gray, shape, prior, _FIT_PX, start=states[k])
         if fit is not None and _believable(fit, shape):
-            score = _score_of(fit.support, fit.length_px, fit.lower_side, picture, shape, fit.state, box)
+            score = _score_of(fit.support, fit.length_px, picture, shape, fit.state, box)
             if score > 0:
                 fits.append((score, Found(fit, prior)))
     return _best(fits, shape)
@@ -299,26 +299,22 @@ def _roll_and_pitch(view: View) -> tuple[float, float]:
 def _score(picture: Blurred, shape: ReferenceShape, state: SolidState, box: FloatArray) -> float:
     """Return px of outline that the picture has where a state puts it, as `_score_of`."""
     samples, support = outline_support(picture, shape, state)
-    return _score_of(support, samples.length_px, samples.lower_side, picture, shape, state, box)
+    return _score_of(support, samples.length_px, picture, shape, state, box)
 
 
 def _score_of(
     support: FloatArray,
     length: FloatArray,
-    lower_side: IntArray,
     picture: Blurred,
     shape: ReferenceShape,
     state: SolidState,
     box: FloatArray,
 ) -> float:
-    """Return px of outline that the picture has, less what is bare of the sides, less what is unlikely.
-
-    A side that is lit like the top shows by its lower edge alone.
+    """Return px of outline that the picture has, less what is bare of the top, less what is unlikely.
 
     Args:
         support: (E,) share of each visible edge that the picture has.
         length: (E,) of each, px.
-        lower_side: (E,) the side whose lower edge each is, or -1.
         picture: Around the reference.
         shape: Its.
         state: Where it is.
@@ -326,7 +322,7 @@ def _score_of(
     """
     support = np.nan_to_num(support, nan=0.0)
     corners = len(shape.corners_m)
-    top = float((length[:corners] * (side_support(support, lower_side, corners) - _BARE_COST)).sum())
+    top = float((length[:corners] * (support[:corners] - _BARE_COST)).sum())
     lower = float((length[corners:] * np.maximum(support[corners:] - _BARE_COST, 0.0)).sum())
     roll, _ = _roll_and_pitch(state.view)
     top_px = _top_px(state, shape)
