@@ -80,7 +80,7 @@ def error_in_sigmas(ground: GroundMap, view: View) -> FloatArray:
             found_m[::2] - found_m[1::2], axis=1
         )
         variance += (np.log(longer) / 1e-3) ** 2
-    return np.abs(off) / np.sqrt(variance)
+    return np.asarray(np.abs(off) / np.sqrt(variance))
 
 
 def telemetry_of(view: View, rng: np.random.Generator | None = None, **changes: float) -> Telemetry:
@@ -245,6 +245,6 @@ def test_what_the_metres_rest_on_is_said_once_it_is_known() -> None:
 
 @pytest.mark.parametrize("missing", ["pitch_deg", "height_m"])
 def test_telemetry_that_lacks_something_is_no_map_and_says_what(missing: str) -> None:
-    said = telemetry_of(looking(), **{missing: np.nan})
+    said = telemetry_of(looking(), None, **{missing: np.nan})
     result = ObservedGround(camera=CameraPrior.calibrated(CAMERA)).update(frame(BARE, 0.0, said), NOTHING, STILL)
     assert "telemetry without" in reason(result)
