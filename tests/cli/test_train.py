@@ -151,6 +151,7 @@ def test_a_damaged_record_is_one_line(call: Call, tmp_path: Path, content: str) 
     assert code == 2 and len(err.strip().splitlines()) == 1
 
 
+@pytest.mark.live
 def test_several_processes_start_as_documented_and_one_of_them_speaks(plan: Path, tmp_path: Path) -> None:
     launch = [sys.executable, "-m", "torch.distributed.run", "--standalone", "--nproc-per-node=2", "-m", "standoff"]
     done = subprocess.run(

@@ -122,8 +122,7 @@ def test_two_checkpoints_are_kept(tmp_path: Path) -> None:
     assert [path.name for path in sorted(tmp_path.iterdir())] == ["step-0000002.pt", "step-0000003.pt"]
 
 
-@pytest.mark.parametrize("optimizer", ["adamw", "sgd"])
-@pytest.mark.parametrize("bf16", [False, True])
+@pytest.mark.parametrize(("optimizer", "bf16"), [("adamw", False), ("sgd", False), ("adamw", True)])
 def test_training_finds_coloured_blocks(data: LabelledData, tmp_path: Path, optimizer: str, bf16: bool) -> None:
     params = small_params(
         steps=160, validate_every=160, checkpoint_every=160, optimizer=optimizer, bf16=bf16, ema=0.9, batch=8,

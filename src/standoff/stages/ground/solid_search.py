@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import combinations
 
 import cv2
 import numpy as np
@@ -16,22 +17,23 @@ import numpy as np
 from standoff.core.camera import Camera, CameraPrior
 from standoff.core.homography import FloatArray
 from standoff.core.pose import LENS, SHIFT, TURN, View
-from standoff.core.types import ImageArray, NoGroundMap
+from standoff.core.types import ImageArray, IntArray, NoGroundMap
 from standoff.stages.ground.edges import between_pixels, canny, sobel_gradients
+from standoff.stages.ground.lines import line_through
 from standoff.stages.ground.oriented import likely_quadrilaterals, noise_thresholds
 from standoff.stages.ground.outline import BOX_OUTSIDE, TOO_FEW_EDGES, undistorted_box
-from standoff.stages.ground.point_fit import views_of_plane
 from standoff.stages.ground.quadrilateral import NO_QUADRILATERAL, ORDERS
 from standoff.stages.ground.shape import ReferenceShape
-from standoff.stages.ground.solid import HEIGHT, STATE, SolidState
+from standoff.stages.ground.solid import HEIGHT, STATE, SolidState, facing_sides
 from standoff.stages.ground.solid_edges import Blurred
-from standoff.stages.ground.solid_fit import Belief, SolidFit, fit_solid, outline_support
+from standoff.stages.ground.solid_fit import Belief, SolidFit, fit_solid, outline_support, side_support
 
 AMBIGUOUS = "the reference could lie in two ways"
 NOT_THERE = "no solid of the reference's shape fits the edges in its box"
 
 _MIN_EDGES = 16
-_QUADRILATERALS = 24
+_QUADRILATERALS, _MIXED = 24, 6
+_LEAST_SINE = 0.05
 _MARGIN = 0.12
 """The search goes this share of the box's longer side beyond the box: detectors cut corners."""
 
@@ -42,7 +44,7 @@ _ROLL_SIGMA_RAD = np.deg2rad(5.0)
 _MAX_ROLL_RAD = np.deg2rad(30.0)
 _MIN_PITCH_RAD = np.deg2rad(5.0)
 _BARE_COST, _ROLL_COST, _PATCHY = 0.45, 0.1, 0.33
-_REFINED = 4
+_REFINED = 10
 _FIT_PX = 5.0
 _RIVAL_SCORE, _RIVAL_PX = 0.9, 4.0
 _MIN_SIDE_SUPPORT, _MIN_MEAN_SUPPORT, _MIN_OTHER_SUPPORT = 0.5, 0.8, 0.85
@@ -138,6 +140,10 @@ def _search(
     if not states:
         return NoGroundMap(NO_QUADRILATERAL)
     scores = np.array([_score(picture, shape, state, box) for state in states])
+    leading = [states[k] for k in np.argsort(-scores, kind="stable")[:_MIXED]]
+    mixed = [other for state in leading for other in _mixed(state, shape, camera.camera)]
+    states += mixed
+    scores = np.concatenate([scores, [_score(picture, shape, state, box) for state in mixed]])
     fits: list[tuple[float, Found]] = []
     for k in np.argsort(-scores, kind="stable")[: _REFINED * len(height.tried_m)]:
         if len(fits) == _REFINED:
@@ -145,7 +151,7 @@ def _search(
         prior = _prior(states[k], camera, height)
         fit = fit_solid(gray, shape, prior, _FIT_PX, start=states[k])
         if fit is not None and _believable(fit, shape):
-            score = _score(picture, shape, fit.state, box)
+            score = _score_of(fit.support, fit.length_px, fit.lower_side, picture, shape, fit.state, box)
             if score > 0:
                 fits.append((score, Found(fit, prior)))
     return _best(fits, shape)
@@ -178,7 +184,7 @@ def _smoothed_in(gray: ImageArray, box: FloatArray, smoothing_px: float) -> Imag
 def _believable(fit: SolidFit, shape: ReferenceShape) -> bool:
     """Return whether the picture has enough of the sides: of every one, or of all but one and of the solid below."""
     count = len(shape.corners_m)
-    sides = np.sort(fit.side_support(count))
+    sides = np.sort(side_support(fit.support, fit.lower_side, count))
     if sides[0] >= _MIN_SIDE_SUPPORT and sides.mean() >= _MIN_MEAN_SUPPORT:
         return True
     lower = fit.support[(fit.lower_side >= 0) & np.isfinite(fit.support)]
@@ -219,11 +225,65 @@ def _states(outline: FloatArray, shape: ReferenceShape, camera: Camera, height: 
                     yield SolidState(lifted, height_m)
 
 
+def _mixed(state: SolidState, shape: ReferenceShape, camera: Camera) -> Iterator[SolidState]:
+    """Give the states in which some sides of an outline taken for the top's were the lower edges of these sides."""
+    straight = View(camera, state.view.position_m, state.view.site_to_camera)
+    count = len(shape.corners_m)
+    top_px = straight.project_pinhole(np.column_stack([shape.corners_m, np.full(count, state.height_m)]))
+    base_px = straight.project_pinhole(np.column_stack([shape.corners_m, np.zeros(count)]))
+    facing = np.flatnonzero(facing_sides(shape, straight))
+    if not np.isfinite(top_px).all() or not np.isfinite(base_px).all():
+        return
+    limit_px = max(_REPROJECTION_PX, _REPROJECTION_SHARE * float(np.linalg.norm(top_px[1] - top_px[0])))
+    for size in range(1, len(facing) + 1):
+        for lower in combinations(facing.tolist(), size):
+            corners_px = _with_sides_raised(top_px, top_px - base_px, lower)
+            if corners_px is None:
+                continue
+            for view in _views(corners_px, shape, camera, limit_px):
+                lifted = View(camera, view.position_m + np.array([0.0, 0.0, state.height_m]), view.site_to_camera)
+                yield SolidState(lifted, state.height_m)
+
+
+def _with_sides_raised(corners_px: FloatArray, rise_px: FloatArray, raised: tuple[int, ...]) -> FloatArray | None:
+    """Return the corners (N, 2) when some sides are moved up by the solid's height and meet the others where they do.
+
+    Args:
+        corners_px: (N, 2), side k from corner k to corner k + 1.
+        rise_px: (N, 2) the picture of the solid's height at each corner.
+        raised: The sides that move.
+    """
+    count = len(corners_px)
+    lines = []
+    for side in range(count):
+        ends = [side, (side + 1) % count]
+        start, end = corners_px[ends] + (rise_px[ends] if side in raised else 0.0)
+        lines.append(line_through(start, end))
+    moved = []
+    for side in range(count):
+        normals = np.array([lines[side - 1][:2], lines[side][:2]])
+        if abs(np.linalg.det(normals)) < _LEAST_SINE:
+            return None
+        moved.append(np.linalg.solve(normals, [-lines[side - 1][2], -lines[side][2]]))
+    return np.array(moved)
+
+
 def _views(corners_px: FloatArray, shape: ReferenceShape, camera: Camera, limit_px: float) -> Iterator[View]:
     """Give the views from above, nearly level, from which the shape at z = 0 has these corners."""
-    for view in views_of_plane(corners_px, shape.corners_m, camera, limit_px):
+    places = np.column_stack([shape.corners_m, np.zeros(len(shape.corners_m))])
+    middle = places.mean(axis=0)
+    found, turns, shifts, errors = cv2.solvePnPGeneric(
+        places - middle, corners_px[:, None], camera.matrix, None, flags=cv2.SOLVEPNP_IPPE
+    )
+    for k in range(found):
+        if float(np.ravel(errors[k])[0]) > limit_px:
+            continue
+        rotation = cv2.Rodrigues(turns[k])[0]
+        left, _, right = np.linalg.svd(rotation)
+        rotation = left @ right
+        view = View(camera, middle - rotation.T @ shifts[k].ravel(), rotation)
         roll, pitch = _roll_and_pitch(view)
-        if abs(roll) < _MAX_ROLL_RAD and pitch > _MIN_PITCH_RAD:
+        if view.position_m[2] > 0 and abs(roll) < _MAX_ROLL_RAD and pitch > _MIN_PITCH_RAD:
             yield view
 
 
@@ -237,12 +297,36 @@ def _roll_and_pitch(view: View) -> tuple[float, float]:
 
 
 def _score(picture: Blurred, shape: ReferenceShape, state: SolidState, box: FloatArray) -> float:
-    """Return px of outline that the picture has, less what is bare of the top, less what is unlikely."""
+    """Return px of outline that the picture has where a state puts it, as `_score_of`."""
     samples, support = outline_support(picture, shape, state)
+    return _score_of(support, samples.length_px, samples.lower_side, picture, shape, state, box)
+
+
+def _score_of(
+    support: FloatArray,
+    length: FloatArray,
+    lower_side: IntArray,
+    picture: Blurred,
+    shape: ReferenceShape,
+    state: SolidState,
+    box: FloatArray,
+) -> float:
+    """Return px of outline that the picture has, less what is bare of the sides, less what is unlikely.
+
+    A side that is lit like the top shows by its lower edge alone.
+
+    Args:
+        support: (E,) share of each visible edge that the picture has.
+        length: (E,) of each, px.
+        lower_side: (E,) the side whose lower edge each is, or -1.
+        picture: Around the reference.
+        shape: Its.
+        state: Where it is.
+        box: (4,) where it was detected.
+    """
     support = np.nan_to_num(support, nan=0.0)
-    length = samples.length_px
     corners = len(shape.corners_m)
-    top = float((length[:corners] * (support[:corners] - _BARE_COST)).sum())
+    top = float((length[:corners] * (side_support(support, lower_side, corners) - _BARE_COST)).sum())
     lower = float((length[corners:] * np.maximum(support[corners:] - _BARE_COST, 0.0)).sum())
     roll, _ = _roll_and_pitch(state.view)
     top_px = _top_px(state, shape)
