@@ -247,6 +247,6 @@ def test_what_the_metres_rest_on_is_said_once_it_is_known() -> None:
 
 @pytest.mark.parametrize("missing", ["pitch_deg", "height_m"])
 def test_telemetry_that_lacks_something_is_no_map_and_says_what(missing: str) -> None:
-    said = telemetry_of(looking(), **{missing: np.nan})
+    said = telemetry_of(looking(), None, **{missing: np.nan})
     result = ObservedGround(camera=CameraPrior.calibrated(CAMERA)).update(frame(BARE, 0.0, said), NOTHING, STILL)
     assert "telemetry without" in reason(result)
