@@ -22,6 +22,7 @@ from standoff.stages.ground.oriented import likely_quadrilaterals, noise_thresho
 from standoff.stages.ground.outline import BOX_OUTSIDE, TOO_FEW_EDGES, undistorted_box
 from standoff.stages.ground.quadrilateral import NO_QUADRILATERAL, ORDERS
 from standoff.stages.ground.shape import ReferenceShape
+from standoff.stages.ground.silhouette import silhouettes
 from standoff.stages.ground.solid import HEIGHT, STATE, SolidState
 from standoff.stages.ground.solid_edges import Blurred
 from standoff.stages.ground.solid_fit import Belief, SolidFit, fit_solid, outline_support
@@ -215,7 +216,10 @@ def _states(outline: FloatArray, shape: ReferenceShape, camera: Camera, height: 
             for height_m in height.tried_m:
                 for level_m in {height_m, 0.0}:
                     lifted = View(camera, view.position_m + np.array([0.0, 0.0, level_m]), view.site_to_camera)
-                    yield SolidState(lifted, height_m)
+                    state = SolidState(lifted, height_m)
+                    yield state
+                    if level_m > 0:
+                        yield from silhouettes(state, outline[order], shape)
 
 
 def _views(corners_px: FloatArray, shape: ReferenceShape, camera: Camera, limit_px: float) -> Iterator[View]:
