@@ -165,7 +165,7 @@ class FakeSite:
             xy_m=xy,
             velocity_mps=step,
             covariance_m2=covariance,
-            map_factor_m=np.where(nan[:, None, None], np.nan, np.zeros((len(xy), 2, 9))),
+            map_factor_m=np.where(nan[:, None, None], np.nan, np.zeros((len(xy), 2, 10))),
             radius_m=np.array([CLASSES[c].action_radius_m for c in self.class_id.tolist()]),
             valid=valid,
             reason=np.where(valid, "", "no ground map" if lost else "outside the trusted area").astype(object),

@@ -48,7 +48,7 @@ def fit_points(prior: Belief, observation: PointObservation) -> Belief:
         rows, values = _weighted(state, observation)
         information = prior.information + rows.T @ rows
         pull = rows.T @ values - prior.information @ state.change_from(prior.state)
-        change: FloatArray = np.linalg.solve(information, pull)
+        change = np.asarray(np.linalg.solve(information, pull), dtype=np.float64)
         following, better = _downhill(prior, observation, state, change)
         if not better < cost:
             break
