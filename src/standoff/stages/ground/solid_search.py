@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import combinations
 
 import cv2
 import numpy as np
@@ -19,12 +18,12 @@ from standoff.core.homography import FloatArray
 from standoff.core.pose import LENS, SHIFT, TURN, View
 from standoff.core.types import ImageArray, NoGroundMap
 from standoff.stages.ground.edges import between_pixels, canny, sobel_gradients
-from standoff.stages.ground.lines import line_through
 from standoff.stages.ground.oriented import likely_quadrilaterals, noise_thresholds
 from standoff.stages.ground.outline import BOX_OUTSIDE, TOO_FEW_EDGES, undistorted_box
 from standoff.stages.ground.quadrilateral import NO_QUADRILATERAL, ORDERS
 from standoff.stages.ground.shape import ReferenceShape
-from standoff.stages.ground.solid import HEIGHT, STATE, SolidState, facing_sides
+from standoff.stages.ground.silhouette import silhouettes
+from standoff.stages.ground.solid import HEIGHT, STATE, SolidState
 from standoff.stages.ground.solid_edges import Blurred
 from standoff.stages.ground.solid_fit import Belief, SolidFit, fit_solid, outline_support, side_support
 
@@ -33,7 +32,6 @@ NOT_THERE = "no solid of the reference's shape fits the edges in its box"
 
 _MIN_EDGES = 16
 _QUADRILATERALS, _MIXED = 24, 6
-_LEAST_SINE = 0.05
 _MARGIN = 0.12
 """The search goes this share of the box's longer side beyond the box: detectors cut corners."""
 
@@ -141,7 +139,7 @@ def _search(
         return NoGroundMap(NO_QUADRILATERAL)
     scores = np.array([_score(picture, shape, state, box) for state in states])
     leading = [states[k] for k in np.argsort(-scores, kind="stable")[:_MIXED]]
-    mixed = [other for state in leading for other in _mixed(state, shape, camera.camera)]
+    mixed = [other for state in leading for other in _mixed(state, shape)]
     states += mixed
     scores = np.concatenate([scores, [_score(picture, shape, state, box) for state in mixed]])
     fits: list[tuple[float, Found]] = []
@@ -225,47 +223,13 @@ def _states(outline: FloatArray, shape: ReferenceShape, camera: Camera, height: 
                     yield SolidState(lifted, height_m)
 
 
-def _mixed(state: SolidState, shape: ReferenceShape, camera: Camera) -> Iterator[SolidState]:
-    """Give the states in which some sides of an outline taken for the top's were the lower edges of these sides."""
-    straight = View(camera, state.view.position_m, state.view.site_to_camera)
-    count = len(shape.corners_m)
-    top_px = straight.project_pinhole(np.column_stack([shape.corners_m, np.full(count, state.height_m)]))
-    base_px = straight.project_pinhole(np.column_stack([shape.corners_m, np.zeros(count)]))
-    facing = np.flatnonzero(facing_sides(shape, straight))
-    if not np.isfinite(top_px).all() or not np.isfinite(base_px).all():
-        return
-    limit_px = max(_REPROJECTION_PX, _REPROJECTION_SHARE * float(np.linalg.norm(top_px[1] - top_px[0])))
-    for size in range(1, len(facing) + 1):
-        for lower in combinations(facing.tolist(), size):
-            corners_px = _with_sides_raised(top_px, top_px - base_px, lower)
-            if corners_px is None:
-                continue
-            for view in _views(corners_px, shape, camera, limit_px):
-                lifted = View(camera, view.position_m + np.array([0.0, 0.0, state.height_m]), view.site_to_camera)
-                yield SolidState(lifted, state.height_m)
-
-
-def _with_sides_raised(corners_px: FloatArray, rise_px: FloatArray, raised: tuple[int, ...]) -> FloatArray | None:
-    """Return the corners (N, 2) when some sides are moved up by the solid's height and meet the others where they do.
-
-    Args:
-        corners_px: (N, 2), side k from corner k to corner k + 1.
-        rise_px: (N, 2) the picture of the solid's height at each corner.
-        raised: The sides that move.
-    """
-    count = len(corners_px)
-    lines = []
-    for side in range(count):
-        ends = [side, (side + 1) % count]
-        start, end = corners_px[ends] + (rise_px[ends] if side in raised else 0.0)
-        lines.append(line_through(start, end))
-    moved = []
-    for side in range(count):
-        normals = np.array([lines[side - 1][:2], lines[side][:2]])
-        if abs(np.linalg.det(normals)) < _LEAST_SINE:
-            return None
-        moved.append(np.linalg.solve(normals, [-lines[side - 1][2], -lines[side][2]]))
-    return np.array(moved)
+def _mixed(state: SolidState, shape: ReferenceShape) -> Iterator[SolidState]:
+    """Give the states in which some sides of an outline taken for the top's are the lower edges of these sides."""
+    outline_px = state.view.project_pinhole(
+        np.column_stack([shape.corners_m, np.full(len(shape.corners_m), state.height_m)])
+    )
+    if np.isfinite(outline_px).all() and state.height_m > 0:
+        yield from silhouettes(state, outline_px, shape)
 
 
 def _views(corners_px: FloatArray, shape: ReferenceShape, camera: Camera, limit_px: float) -> Iterator[View]:
