@@ -75,8 +75,9 @@ types: $(READY)
 contracts: $(READY)
 	$(BIN)/lint-imports
 
+# One thread a worker: two workers with two threads each get in each other's way, and sums depend on their number.
 unit: $(READY)
-	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal --cov --cov-report=term --cov-fail-under=95
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal --cov --cov-report=term --cov-fail-under=95
 
 bench: $(READY)
 	$(BIN)/python -m pytest benchmarks -p no:xdist --benchmark-only --benchmark-columns=median,iqr,rounds

@@ -54,6 +54,7 @@ def _assert_equal(batch: Batch, other: Batch) -> None:
     assert all(torch.equal(getattr(batch, name), getattr(other, name)) for name in _TENSORS)
 
 
+@pytest.mark.filterwarnings("ignore:This DataLoader will create")  # of more workers than the machine has cores
 @pytest.mark.parametrize("workers", [0, 1, 2])
 def test_a_resumed_run_sees_the_same_pictures_with_any_number_of_workers(
     drawn: list[LabelledPicture], workers: int
