@@ -144,6 +144,7 @@ class FusedGround:
 
     def _prior_for(self, size_px: tuple[int, int]) -> CameraPrior:
         if self._camera is None or self._size_px != size_px:
+            self.reset()
             self._place.check_size(size_px)
             given = self._given_camera
             try:
@@ -154,8 +155,6 @@ class FusedGround:
                     found=str(error),
                     fix="calibrate with pictures from the same camera mode as the video",
                 ) from error
-            if self._size_px is not None and self._size_px != size_px:
-                self._filter = PoseFilter()
             self._size_px = size_px
         return self._camera
 
