@@ -169,6 +169,9 @@ CARRIED_PX = 1e-6
 MAP_SIGMA_REL = 0.1
 """As FIRST_ORDER_SIGMA_REL with small errors, which see hardly any curvature: 600 trials (2.9 %, three of those)."""
 
+KEYED_MAP_M = 1e-4
+"""Lengths of ten metres with and without a new keyframe: corrections reach a keyframe by their first derivative."""
+
 SAME_MAP_M = 1e-6
 """The same distances in two site frames: numerical derivatives and the order of sums."""
 PROJECTED_PX = 1e-6

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from drawn_ground import frame
 from drawn_solid import box_around, distance_and_sigma, drawn, lens, looking_at, motion_between, top_px
-from tolerances import SAME_MAP_M
+from tolerances import KEYED_MAP_M
 
 from standoff.core.camera import CameraPrior
 from standoff.core.classes import CLASS_BY_NAME
@@ -157,7 +157,7 @@ def test_a_new_keyframe_changes_nothing_where_motions_are_exact() -> None:
     rekeyed = _run(_ground(), range(8), hidden=range(2, 8), keys=dict.fromkeys(range(4, 8), 3))
     for one, other in zip(plain, rekeyed, strict=True):
         lengths = [distance_and_sigma(_seen(result), PAIR_PX)[0] for result in (one, other)]
-        assert lengths[0] == pytest.approx(lengths[1], abs=10.0 * SAME_MAP_M)
+        assert lengths[0] == pytest.approx(lengths[1], abs=KEYED_MAP_M)
 
 
 def test_a_reset_forgets_everything() -> None:

@@ -20,7 +20,7 @@ from standoff.stages.ground.marker_fit import PointFit, agreeing, first_fit, fit
 from standoff.stages.ground.marker_observer import MarkerObserver
 from standoff.stages.ground.observation import PointObservation
 from standoff.stages.ground.params import ObservedParams
-from standoff.stages.ground.pose_filter import PoseFilter
+from standoff.stages.ground.pose_filter import LASTING_SHARE, PoseFilter
 from standoff.stages.ground.pose_map import length_sigma, map_from_view, middle_scale_m_per_px
 from standoff.stages.ground.since import MotionSince
 from standoff.stages.ground.sizes_view import SizesView
@@ -313,7 +313,7 @@ class ObservedGround:
         return length_sigma(view, covariance) < 0.9 * sigma or (other and self._source == "sizes")
 
     def _begin(self, source: Source, view: View, covariance: FloatArray, moment: _Moment) -> None:
-        self._filter.start(belief_of(view, covariance), moment.frame.time_s)
+        self._filter.start(belief_of(view, covariance), moment.frame.time_s, lasting_share=LASTING_SHARE)
         self._since.begin(moment.frame.time_s, moment.motion)
         self._source, self._refused_since_s = source, None
         self._begun_sigma = self.length_sigma

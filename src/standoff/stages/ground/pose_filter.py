@@ -21,7 +21,7 @@ from standoff.stages.ground.solid_fit import Belief
 _SAME_S, _SAME_UNSURE_S = 0.5, 4.0
 """The second while the lens is unsure: errors of edges are then taken for the lens's, the same in each frame."""
 
-_LASTING_SHARE, _LASTING_UNSURE_SHARE = 0.3, 1.0
+LASTING_SHARE, _LASTING_UNSURE_SHARE = 0.3, 1.0
 """Of one observation's variance so much is there in each and never averages out."""
 
 _SURE_FOCAL_SIGMA = 0.02
@@ -72,7 +72,7 @@ class PoseFilter:
         self._lost: tuple[Estimate, float] | None = None
         self._observed_s = -np.inf
         self._lasting_trace = np.inf
-        self._same_s, self._lasting_share = _SAME_S, _LASTING_SHARE
+        self._same_s, self._lasting_share = _SAME_S, LASTING_SHARE
         self._height_doubt_m2 = np.zeros((STATE, STATE))
 
     @property
@@ -85,8 +85,18 @@ class PoseFilter:
         """When an observation was last taken in; minus infinity before the first."""
         return self._observed_s
 
-    def start(self, belief: Belief, time_s: float, *, height_known: bool = True) -> None:
-        """Begin, or begin again, with a belief about this frame; say whether the height was measured by hand."""
+    def start(
+        self, belief: Belief, time_s: float, *, height_known: bool = True, lasting_share: float | None = None
+    ) -> None:
+        """Begin, or begin again, with a belief about this frame.
+
+        Args:
+            belief: What is known now.
+            time_s: Of the frame.
+            height_known: Whether the solid's height was measured by hand.
+            lasting_share: Of the belief's covariance, what is there in every frame and never averages out; None: what
+                edges of a reference leave, more of it while the lens is unsure.
+        """
         covariance = _inverse(belief.information)
         lens_sure = covariance[6, 6] < _SURE_FOCAL_SIGMA**2
         self._height_doubt_m2 = np.zeros((STATE, STATE))
@@ -96,7 +106,9 @@ class PoseFilter:
             together[[5, HEIGHT]] = _GUESSED_HEIGHT_SIGMA_M
             self._height_doubt_m2 = np.outer(together, together)
         self._same_s = _SAME_S if lens_sure else _SAME_UNSURE_S
-        self._lasting_share = _LASTING_SHARE if lens_sure else _LASTING_UNSURE_SHARE
+        self._lasting_share = LASTING_SHARE if lens_sure else _LASTING_UNSURE_SHARE
+        if lasting_share is not None:
+            self._lasting_share = lasting_share
         lasting = self._lasting_share * covariance + self._height_doubt_m2
         self._lost = None
         self._now = Estimate(belief.state, covariance, lasting)
