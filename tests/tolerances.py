@@ -66,7 +66,7 @@ EDGE_PX = 0.03
 REFERENCE_GROUND_REL = 0.005
 """Lengths of the reference's size, measured with it: corners good to 0.05-0.1 px of 100 px sides, on two sides."""
 
-DRAWN_SITE_M = {"paper": 0.8, "paper+tls": 0.3, "oriented": 0.2}
+DRAWN_SITE_M = {"paper": 0.8, "paper+tls": 0.3, "oriented": 0.2, "fused": 0.2}
 """Root mean square error of distances of about 10 m through a square of 2.89 m that is 100 px wide: a corner error of
 half a pixel is 1.5 cm on the square and grows with the square of the distance from it. Measured over three seeds: 0.51,
 0.17 and 0.12 m at the worst."""
@@ -169,5 +169,22 @@ CARRIED_PX = 1e-6
 MAP_SIGMA_REL = 0.1
 """As FIRST_ORDER_SIGMA_REL with small errors, which see hardly any curvature: 600 trials (2.9 %, three of those)."""
 
+KEYED_MAP_M = 1e-4
+"""Lengths of ten metres with and without a new keyframe: corrections reach a keyframe by their first derivative."""
+
 SAME_MAP_M = 1e-6
 """The same distances in two site frames: numerical derivatives and the order of sums."""
+PROJECTED_PX = 1e-6
+"""A pinhole camera taken apart into place and rotation and put together again, in float64 at 50 m."""
+
+STATED_COVERAGE = 0.9
+"""Of 95 % regions of a map in one clip: its errors are one error that lasts, so nearly all are in or all are out."""
+
+FITTED_M = 1e-4
+"""A camera 25 m away from exact corners of a 2.9 m square: the rest of a Gauss-Newton that stops at its rounding."""
+
+PEER_POSE_M = 2e-3
+"""Two least-squares poses of one square 27 m away: OpenCV stops its steps early along the flat direction."""
+
+POSE_SIGMA_REL = 0.2
+"""First-order standard errors of a pose against 120 trials: 6.5 % is sampling, three of those, and the curvature."""

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import html
 import json
 import os
 import signal
@@ -136,6 +137,36 @@ def test_a_run_in_which_nothing_could_be_measured_is_not_a_success(
     assert not any(table["measured"])
     reasons = pq.read_table(tmp_path / "out" / "frames.parquet")["map_reason"].to_pylist()
     assert set(reasons) == {"no ground is configured"}
+
+
+def test_a_survey_in_centimetres_is_told_at_the_end_and_measures_no_longer(
+    call: Call, video: Path, site: Path, tmp_path: Path
+) -> None:
+    survey = yaml.safe_load((tmp_path / "survey.yaml").read_text(encoding="utf-8"))
+    for point in survey["points"]:
+        point["m"] = [100.0 * metre for metre in point["m"]]
+    (tmp_path / "survey.yaml").write_text(yaml.safe_dump(survey), encoding="utf-8")
+    words = ("--config", site, "--out", tmp_path / "out", "--outputs", "report", "--quiet")
+    code, _, err = call("run", video, *words)
+    record = json.loads((tmp_path / "out" / "run.json").read_text(encoding="utf-8"))
+    assert (code, err.count("\n")) == (0, 1)
+    assert "people and machines look" in err and "times too large: " in err
+    assert len(record["warnings"]) == 1 and record["warnings"][0] in err
+    assert any("times too large: " in reason for reason in record["counts"]["no_ground_map"])
+    assert record["warnings"][0] in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+
+
+def test_with_nothing_told_a_run_measures_or_says_what_would_help(
+    call: Call, video: Path, site: Path, tmp_path: Path
+) -> None:
+    code, _, err = call("run", video, "--config", site, "--ground", "auto", "--out", tmp_path / "out", "--quiet")
+    record = json.loads((tmp_path / "out" / "run.json").read_text(encoding="utf-8"))
+    assert (code, "no frame could be measured" in err) == (1, True)
+    assert all("would help" in reason for reason in record["counts"]["no_ground_map"])
+    assert record["ground"]["basis"].startswith("nothing: too few people")
+    assert html.escape(record["ground"]["basis"]).replace("&#x27;", "&#39;") in (
+        tmp_path / "out" / "report.html"
+    ).read_text(encoding="utf-8")
 
 
 def test_a_second_run_into_the_same_folder_needs_overwrite(call: Call, video: Path, site: Path, tmp_path: Path) -> None:

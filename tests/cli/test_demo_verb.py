@@ -36,9 +36,25 @@ def test_the_demo_writes_all_outputs_and_prints_how_far_off_it_is(drawn: Clip, t
     assert made >= {"report.html", "annotated.mp4", "run.json", "tracks.parquet", "proximity.parquet", "hazards.jsonl"}
     for words in ("complete", "recall", "MADE", " of 2 recognised", "False warnings", "report.html", "annotated.mp4"):
         assert words in said
+    assert "the paper's method" in said and "frames with a map" in said
     found = json.loads((tmp_path / "found.json").read_text())
     assert found["frames"] == drawn.frame_count
     assert {one["kind"] for one in found["encounters"]} == {"breach"}
+
+
+def test_the_demo_runs_defaults_and_the_papers_method_on_the_same_boxes(
+    drawn: Clip, tmp_path: Path, call: Call
+) -> None:
+    out = tmp_path / "out"
+    code, said, _ = call("demo", "--out", out, "--json", "-")
+    assert code == 0
+    found, record = json.loads(said), json.loads((out / "run.json").read_text())
+    assert record["settings"]["ground"]["reference"]["params"]["method"] == "fused"
+    assert record["settings"]["locate"]["anchor"] == "bottom_centre"
+    # What lies on the square for a moment hides it from the paper's method, not from one that follows the picture.
+    assert found["frames_with_map"] == drawn.frame_count
+    assert found["paper"]["frames_with_map"] == drawn.frame_count - len(drawn_clip.HIDDEN)
+    assert found["map_only"]["level"]["p95_m"] < found["paper"]["map_only"]["level"]["p95_m"]
 
 
 def test_machines_get_only_json(drawn: Clip, tmp_path: Path, call: Call) -> None:

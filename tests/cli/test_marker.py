@@ -83,7 +83,7 @@ def test_markers_that_contradict_something_are_refused(ground: dict[str, object]
 
 def test_markers_that_no_ground_stage_reads_are_refused_not_ignored() -> None:
     marker = {"size_m": 1.0, "x_m": 4.0, "y_m": 2.0}
-    with pytest.raises(ConfigError, match="take the markers out"):
+    with pytest.raises(ConfigError, match="Take the markers out"):
         build_ground(load_settings(None, {"ground": {"markers": [marker], "reference": {"square_m": 2.0}}}))
 
 

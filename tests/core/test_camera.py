@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tolerances import DISTORTION_PX, ITERATED_INVERSE_PX
 
-from standoff.core.camera import Camera
+from standoff.core.camera import DRONE_FIELD_DEG, Camera, CameraPrior
 from standoff.core.homography import FloatArray
 
 _MATRIX = np.array([[535.9, 0.0, 342.3], [0.0, 536.4, 235.6], [0.0, 0.0, 1.0]])
@@ -113,3 +113,34 @@ def test_a_camera_is_not_changed_by_changing_what_it_was_made_of() -> None:
     assert camera.matrix[0, 0] == _MATRIX[0, 0]
     with pytest.raises(ValueError, match="read-only"):
         camera.matrix[0, 0] = 1.0
+
+
+def test_a_refocused_camera_has_longer_focal_lengths_and_another_k1_and_nothing_else() -> None:
+    camera, other = lens_camera(), lens_camera().refocused(1.25, -0.1)
+    np.testing.assert_allclose(np.diag(other.matrix)[:2], 1.25 * np.diag(camera.matrix)[:2], rtol=1e-12)
+    np.testing.assert_array_equal(other.matrix[:2, 2], camera.matrix[:2, 2])
+    assert other.distortion.tolist() == [-0.1, *camera.distortion.tolist()[1:]]
+
+
+@given(st.floats(-0.5, 0.5))
+def test_a_lens_of_k1_alone_is_the_limit_of_lenses_with_a_little_k2(k1: float) -> None:
+    points_px = np.column_stack([np.linspace(-2000.0, 2600.0, 200), np.linspace(-900.0, 1400.0, 200)])
+    plain, nearly = (Camera(640, 480, _MATRIX, np.array([k1, k2, 0.0, 0.0, 0.0])) for k2 in (0.0, 1e-12))
+    np.testing.assert_allclose(plain.distort(points_px), nearly.distort(points_px), atol=DISTORTION_PX)
+
+
+def test_an_unknown_camera_has_a_drone_s_field_in_any_picture() -> None:
+    for width, height in ((1920, 1080), (1080, 1920), (640, 480)):
+        prior = CameraPrior.unknown(width, height)
+        half = max(width, height) / 2.0 / prior.camera.matrix[0, 0]
+        assert 2.0 * np.rad2deg(np.arctan(half)) == pytest.approx(DRONE_FIELD_DEG)
+        assert prior.focal_sigma > CameraPrior.calibrated(prior.camera).focal_sigma
+
+
+def test_what_is_known_of_a_camera_scales_with_the_picture_and_keeps_its_errors() -> None:
+    prior = CameraPrior.calibrated(lens_camera())
+    half = prior.scaled_to(320, 240)
+    assert half.camera.matrix[0, 0] == pytest.approx(prior.camera.matrix[0, 0] / 2.0)
+    assert (half.focal_sigma, half.k1_sigma, half.origin) == (prior.focal_sigma, prior.k1_sigma, prior.origin)
+    with pytest.raises(ValueError, match="aspect"):
+        prior.scaled_to(320, 320)

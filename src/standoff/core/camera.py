@@ -109,15 +109,21 @@ class Camera:
 
         Beyond its first fold the polynomial shows directions a second time that no lens puts there.
         """
-        k1, k2, _, _, k3 = self.distortion
-        slope_roots = np.roots([7.0 * k3, 5.0 * k2, 3.0 * k1, 1.0])
-        folds_r2 = slope_roots.real[(slope_roots.real > 0) & (np.abs(slope_roots.imag) < 1e-12)]
         with np.errstate(invalid="ignore", over="ignore"):
             _, jacobian = self.distorted_with_jacobian(normalised)
             determinant = jacobian[:, 0, 0] * jacobian[:, 1, 1] - jacobian[:, 0, 1] * jacobian[:, 1, 0]
             grows = (determinant > 0) & (jacobian[:, 0, 0] + jacobian[:, 1, 1] > 0)
-            unfolded: BoolArray = grows & ((normalised**2).sum(axis=1) < folds_r2.min(initial=np.inf))
+            unfolded: BoolArray = grows & ((normalised**2).sum(axis=1) < self._first_fold_r2())
         return unfolded
+
+    def _first_fold_r2(self) -> float:
+        """Return the square of the undistorted radius at which the radial polynomial first turns back; inf if never."""
+        k1, k2, _, _, k3 = self.distortion.tolist()
+        if k2 == 0.0 and k3 == 0.0:
+            return -1.0 / (3.0 * k1) if k1 < 0.0 else np.inf
+        slope_roots = np.roots([7.0 * k3, 5.0 * k2, 3.0 * k1, 1.0])
+        folds_r2 = slope_roots.real[(slope_roots.real > 0) & (np.abs(slope_roots.imag) < 1e-12)]
+        return float(folds_r2.min(initial=np.inf))
 
     def distort(self, points_px: FloatArray) -> FloatArray:
         """Move ideal pinhole pixels to where the lens puts them.

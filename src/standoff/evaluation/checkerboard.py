@@ -282,7 +282,7 @@ def _map_all(image_to_ground: FloatArray, grid_px: FloatArray) -> FloatArray:
 def _through_ground_stage(grid_px: FloatArray, grid_m: FloatArray, camera: Camera) -> FloatArray:
     """Return the grid's places through the ground stage's own map from a flat reference: the first square."""
     belief = _belief(grid_px[:2, :2], grid_m[:2, :2], camera)
-    covariance = np.linalg.inv(belief.information)[:CHANGES, :CHANGES]
+    covariance = np.asarray(np.linalg.inv(belief.information)[:CHANGES, :CHANGES], dtype=np.float64)
     square_px = grid_px[:2, :2].reshape(-1, 2)
     ground = map_from_view(
         belief.state.view, covariance, method="first square", scale_m_per_px=np.nan, anchors_px=square_px

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal
 
@@ -16,8 +18,10 @@ from standoff.core.errors import DataError
 from standoff.core.types import FrameResult, Severity
 from standoff.evaluation.paper.clip import Clip
 from standoff.evaluation.paper.localisation import ClassScore, score_localisation
+from standoff.evaluation.paper.map_only import MapScore, score_map
 from standoff.evaluation.paper.pairs import PairGroup, group_pairs, pair_series
-from standoff.evaluation.paper.watch import NOTHING, Notes
+from standoff.evaluation.paper.trial import Trial, build_monitor, settings_for
+from standoff.evaluation.paper.watch import NOTHING, Notes, open_clip_video
 
 Pair = tuple[int, int]
 Kind = Literal["near miss", "breach"]
@@ -64,6 +68,7 @@ class ClipScore:
     Attributes:
         frames: Of the run.
         frames_with_map: Of these, with a ground map.
+        map_only: The ground map alone, without boxes.
         classes: Recall and position errors of each class.
         pairs: Distance errors of each kind of pair.
         encounters: All true ones, in the order of time.
@@ -72,6 +77,7 @@ class ClipScore:
 
     frames: int
     frames_with_map: int
+    map_only: MapScore
     classes: tuple[ClassScore, ...]
     pairs: tuple[PairGroup, ...]
     encounters: tuple[Encounter, ...]
@@ -89,6 +95,32 @@ class _Said:
 
     track_ids: Pair
     first_s: dict[Severity, float]
+
+
+def score_papers_method(clip: Clip, recording: Path, on_frame: Callable[[], None] | None = None) -> ClipScore:
+    """Score the paper's method, exactly as printed, on the detections of a run of the clip.
+
+    Its edges, lines and corners within the detected box, the lens distortion left in the picture, the centre of the
+    box for the entity, and its outlier filter.
+
+    Args:
+        clip: With a reference object.
+        recording: The run's folder, or its table of detections.
+        on_frame: Called after each frame.
+
+    Raises:
+        DataError: The clip has no reference object, or the detections are of another video.
+        StandoffError: The video or the detections cannot be read.
+    """
+    trial = Trial("paper", recording)
+    with open_clip_video(clip) as source:
+        witness = ClipWitness(clip, settings_for(clip, trial), source.size_px)
+        with closing(build_monitor(clip, trial, source).run()) as results:
+            for result in results:
+                witness.take(result)
+                if on_frame is not None:
+                    on_frame()
+    return witness.score()
 
 
 class ClipWitness:
@@ -140,6 +172,7 @@ class ClipWitness:
         return ClipScore(
             frames=self._notes.taken,
             frames_with_map=int(np.isfinite(watched.scale_m_per_px).sum()),
+            map_only=score_map(clip, watched),
             classes=score_localisation(clip, watched),
             pairs=group_pairs(pair_series(clip, watched, benchmark=False)),
             encounters=tuple(encounters),

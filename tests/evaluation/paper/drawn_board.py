@@ -88,6 +88,10 @@ def _write_tables(folder: Path) -> None:
             "reference_visible_share": float("nan"),
             "board_x_px": corners_px(frame)[:, 0].tolist(),
             "board_y_px": corners_px(frame)[:, 1].tolist(),
+            "camera_x_m": 0.0,
+            "camera_y_m": 0.0,
+            "camera_z_m": 0.0,
+            "site_to_camera": np.eye(3).ravel().tolist(),
         }
         for frame in range(FRAMES)
     ]

@@ -74,8 +74,10 @@ def write_clip(folder: Path, preset: str = "mobile") -> Path:
     _write_video(folder / "video.mp4")
     width, height = draw_site.SIZE_PX
     camera = {"width_px": width, "height_px": height, "fx": draw_site.FOCAL_PX, "fy": draw_site.FOCAL_PX}
-    (folder / "camera.yaml").write_text(yaml.safe_dump(camera | {"cx": width / 2, "cy": height / 2}))
-    reference = {"ground": {"reference": {"corners_m": SQUARE_M.tolist()}, "camera": "camera.yaml"}}
+    (folder / "camera.yaml").write_text(
+        yaml.safe_dump(camera | {"cx": width / 2 + _DRAWN_PX, "cy": height / 2 + _DRAWN_PX})
+    )
+    reference = {"ground": {"reference": {"corners_m": SQUARE_M.tolist(), "height_m": 0.0}, "camera": "camera.yaml"}}
     (folder / "reference.yaml").write_text(yaml.safe_dump(reference))
     top_m = np.column_stack([SQUARE_M, np.zeros(4)]).tolist()
     scene = {
@@ -83,7 +85,14 @@ def write_clip(folder: Path, preset: str = "mobile") -> Path:
         "preset": preset,
         "seed": 0,
         "entities": [{"entity_id": e.entity_id, "class_name": e.class_name} for e in ENTITIES],
-        "reference": {"entity_id": REFERENCE_ID, "top_m": top_m, "base_m": top_m, "covers": []},
+        "reference": {
+            "entity_id": REFERENCE_ID,
+            "top_m": top_m,
+            "base_m": top_m,
+            "ground_m": 0.0,
+            "height_m": 0.0,
+            "covers": [],
+        },
         "board": None,
     }
     (folder / "scene.json").write_text(json.dumps(scene))
@@ -146,6 +155,16 @@ def _reference_row(frame: int) -> dict[str, Any]:
     return ids | _place(frame, SQUARE_M.mean(axis=0)) | _box(seen_px(frame, SQUARE_M))
 
 
+def _camera_of(frame: int) -> dict[str, Any]:
+    projection = draw_site.camera(time_s(frame))
+    width, height = draw_site.SIZE_PX
+    matrix = np.array([[draw_site.FOCAL_PX, 0, width / 2], [0, draw_site.FOCAL_PX, height / 2], [0, 0, 1]])
+    rotation = np.linalg.inv(matrix) @ projection[:, :3]
+    position_m = -np.linalg.solve(projection[:, :3], projection[:, 3])
+    place = dict(zip(("camera_x_m", "camera_y_m", "camera_z_m"), position_m.tolist(), strict=True))
+    return place | {"site_to_camera": rotation.ravel().tolist()}
+
+
 def _frame_row(frame: int) -> dict[str, Any]:
     x_px, y_px = seen_px(frame, SQUARE_M).T.tolist()
     return {
@@ -156,4 +175,5 @@ def _frame_row(frame: int) -> dict[str, Any]:
         "reference_visible_share": 1.0,
         "board_x_px": np.zeros(0).tolist(),
         "board_y_px": np.zeros(0).tolist(),
+        **_camera_of(frame),
     }

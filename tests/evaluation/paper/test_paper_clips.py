@@ -13,6 +13,7 @@ from evaluation.paper import drawn_clip
 
 from standoff.config import Settings, build_stage
 from standoff.config.settings import StageName
+from standoff.core.camera import CameraPrior
 from standoff.core.errors import DataError
 from standoff.core.types import Detections, Frame, NoCameraMotion
 from standoff.evaluation.paper import BoxError, Clip, Trial, evaluate_clip, load_clip
@@ -213,8 +214,8 @@ class ShiftedBoxes:
 
 
 def _with_model(monkeypatch: pytest.MonkeyPatch, clip: Clip, sees: str) -> Trial:
-    def build(name: StageName, settings: Settings) -> object:
-        return ShiftedBoxes(clip, sees) if name == "detect" else build_stage(name, settings)
+    def build(name: StageName, settings: Settings, camera: CameraPrior | None = None) -> object:
+        return ShiftedBoxes(clip, sees) if name == "detect" else build_stage(name, settings, camera)
 
     monkeypatch.setattr("standoff.evaluation.paper.trial.build_stage", build)
     return Trial(method="oriented", detector=Path("model.onnx"))

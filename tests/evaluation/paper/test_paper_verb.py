@@ -47,6 +47,13 @@ def test_flat_entities_under_true_boxes_are_where_they_are(measured: dict[str, A
         assert 0.0 < group["scores"]["after the filter"]["made_m"] < limit_m
 
 
+def test_the_map_alone_is_measured(measured: dict[str, Any]) -> None:
+    score = measured["map_only"]
+    assert score["without_map"] == score["without_map_since_seen"] == len(drawn_clip.HIDDEN)
+    for kind in ("level", "uneven"):
+        assert 0.0 < score[kind]["median_m"] < tolerances.DRAWN_SITE_M[measured["trial"]["method"]]
+
+
 def test_failed_frames_are_counted_as_failed_whatever_fills_them(measured: dict[str, Any]) -> None:
     hidden, frames = len(drawn_clip.HIDDEN), drawn_clip.FRAMES
     rectification = measured["rectification"]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from drawn_ground import frame
 from drawn_solid import box_around, distance_and_sigma, drawn, lens, looking_at, motion_between, top_px
-from tolerances import SAME_MAP_M
+from tolerances import KEYED_MAP_M
 
 from standoff.core.camera import CameraPrior
 from standoff.core.classes import CLASS_BY_NAME
@@ -116,7 +116,7 @@ def test_a_hidden_reference_is_carried_and_grows_older_and_less_sure() -> None:
     at_rest = _ground()
     results = [_seen(_ground_update(at_rest, 0, time_s, solid=time_s < 0.5)) for time_s in (0.0, 0.4, 0.8, 1.6)]
     sigmas = [distance_and_sigma(result, PAIR_PX)[1] for result in results[1:]]
-    assert (np.diff(sigmas) >= 0.0).all(), sigmas
+    assert (np.diff(sigmas) >= -1e-9).all(), sigmas
 
 
 def test_a_hidden_reference_carried_from_keyframe_to_keyframe_ends_in_no_map() -> None:
@@ -124,7 +124,7 @@ def test_a_hidden_reference_carried_from_keyframe_to_keyframe_ends_in_no_map() -
     _seen(ground.update(frame(_picture(0), 0.0), NOTHING, STILL))
     sigmas = []
     for k in range(1, 40):
-        motion = motion_between(_flown(0).view, _flown(0).view, (k - 1) / FPS, sigma_px=3.0)
+        motion = motion_between(_flown(0).view, _flown(0).view, (k - 1) / FPS, sigma_px=10.0)
         result = ground.update(frame(drawn(SHAPE, _flown(0), solid=False), k / FPS), NOTHING, motion)
         if isinstance(result, NoGroundMap):
             break
@@ -157,7 +157,7 @@ def test_a_new_keyframe_changes_nothing_where_motions_are_exact() -> None:
     rekeyed = _run(_ground(), range(8), hidden=range(2, 8), keys=dict.fromkeys(range(4, 8), 3))
     for one, other in zip(plain, rekeyed, strict=True):
         lengths = [distance_and_sigma(_seen(result), PAIR_PX)[0] for result in (one, other)]
-        assert lengths[0] == pytest.approx(lengths[1], abs=SAME_MAP_M)
+        assert lengths[0] == pytest.approx(lengths[1], abs=KEYED_MAP_M)
 
 
 def test_a_reset_forgets_everything() -> None:

@@ -118,7 +118,7 @@ def test_what_the_reference_cannot_be_is_passed_over() -> None:
     gray = np.full((320, 320), 80, np.uint8)
     gray[60:160, 60:160] = 180
     gray[64:164, 170:270] = 180
-    finder = OutlineFinder(ReferenceParams(), believable=lambda corners: float(corners.mean(axis=0)[0]) < 120)
+    finder = OutlineFinder(believable=lambda corners: float(corners.mean(axis=0)[0]) < 120)
     outline = finder.find(gray, np.array([50.0, 50.0, 280.0, 175.0]))
     assert isinstance(outline, Quadrilateral)
     np.testing.assert_allclose(np.sort(outline.corners_px, axis=0), [[59.5] * 2] * 2 + [[159.5] * 2] * 2, atol=0.1)

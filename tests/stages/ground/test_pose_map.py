@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from drawn_solid import distance_and_sigma, lens, looking_at
-from tolerances import GEOMETRY_REL, GROUND_THROUGH_LENS_M, MAP_SIGMA_REL
+from tolerances import DERIVATIVE_REL, GEOMETRY_REL, GROUND_THROUGH_LENS_M, MAP_SIGMA_REL
 
 from standoff.core.homography import FloatArray
 from standoff.core.pose import View
@@ -62,3 +62,12 @@ def test_the_covariance_is_symmetrical_and_never_negative() -> None:
     np.testing.assert_array_equal(covariance, covariance.T)
     spread = np.sqrt(np.diag(covariance))
     assert np.linalg.eigvalsh(covariance / np.outer(spread, spread)).min() > -1e-6
+
+
+@pytest.mark.parametrize("k", range(8))
+def test_the_entries_move_with_the_view_as_small_differences_do(k: int) -> None:
+    step = np.eye(8)[k] * 1e-5
+    ends = [np.append(_map(VIEW.changed(sign * step)).image_to_ground, sign * step[7]) for sign in (1.0, -1.0)]
+    slope = (ends[0] - ends[1]) / 2e-5
+    covariance = _map(VIEW, np.outer(np.eye(8)[k], np.eye(8)[k])).covariance
+    np.testing.assert_allclose(covariance, np.outer(slope, slope), atol=DERIVATIVE_REL * (slope**2).max())

@@ -6,8 +6,8 @@ from tolerances import SOLID_CHI2, SOLID_CHI2_LEAST, SOLID_PX
 
 from standoff.core.homography import FloatArray
 from standoff.stages.ground import ReferenceShape
-from standoff.stages.ground.solid import SolidState, facing_sides
-from standoff.stages.ground.solid_fit import Belief, SolidFit, fit_solid
+from standoff.stages.ground.solid import SolidState, facing_sides, sample_edges
+from standoff.stages.ground.solid_fit import Belief, SolidFit, _medians, fit_solid
 
 SHAPE = ReferenceShape.rectangle(2.0, 2.89)
 CAMERA = lens(k1=-0.05)
@@ -96,3 +96,15 @@ def test_all_of_the_outline_is_seen_in_a_clean_picture() -> None:
     outline: FloatArray = np.concatenate([top_px(SHAPE, state), base_px(SHAPE, state)])
     box = box_around(SHAPE, state, margin_px=0.0)
     assert (outline >= box[:2]).all() and (outline <= box[2:]).all()
+
+
+def test_the_median_of_each_edge_is_numpy_s() -> None:
+    samples = sample_edges(SHAPE, _state(2))
+    rng = np.random.default_rng(0)
+    residual = rng.normal(size=len(samples))
+    for share in (0.0, 0.05, 0.5, 1.0):
+        found = rng.uniform(size=len(samples)) < share
+        expected = np.zeros(len(samples.length_px))
+        for edge in np.unique(samples.edge[found]):
+            expected[edge] = np.median(residual[found & (samples.edge == edge)])
+        np.testing.assert_array_equal(_medians(residual, found, samples), expected)

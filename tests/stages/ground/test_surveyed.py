@@ -127,7 +127,7 @@ def distance_and_sigma(current: GroundMap, pair_px: FloatArray) -> tuple[float, 
     distance_m = float(np.linalg.norm(ends_m[1] - ends_m[0]))
     by_entries = homography.parameter_jacobian(current.image_to_ground, current.undistorted(pair_px))
     slope = (ends_m[1] - ends_m[0]) / distance_m @ (by_entries[1] - by_entries[0])
-    return distance_m, float(np.sqrt(slope @ current.covariance @ slope))
+    return distance_m, float(np.sqrt(slope @ current.covariance[:9, :9] @ slope))
 
 
 @pytest.mark.parametrize("count", [4, 6, 8])

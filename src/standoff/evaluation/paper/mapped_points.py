@@ -51,8 +51,9 @@ class MappedPoints:
 
 
 def level_feet_px(clip: Clip) -> FloatArray:
-    """Return (F, E, 2) where the picture would show the entities' feet if the ground were as high everywhere as it is
-    under the reference; NaN behind the camera.
+    """Return (F, E, 2) where the picture would show feet on ground that is everywhere as high as under the reference.
+
+    NaN behind the camera.
 
     Args:
         clip: With a reference object.

@@ -79,7 +79,7 @@ def pool(results: Sequence[ClipResult]) -> PooledMap | None:
 
 
 def _together(clips: Sequence[_OfClip]) -> dict[str, float]:
-    without, frames, without_since, frames_since = sum(one.frames for one in clips)
+    without, frames, without_since, frames_since = np.sum([one.frames for one in clips], axis=0)
     found = {
         "without_map_share": without / frames,
         "without_map_since_seen_share": without_since / frames_since if frames_since else float("nan"),

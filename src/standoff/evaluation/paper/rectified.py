@@ -78,7 +78,7 @@ def failed_frames(watched: Watched, reference: TrueReference) -> BoolArray:
 def wrong_frames(watched: Watched) -> BoolArray:
     """Return (F,) which frames have a map that should not have been believed.
 
-    Where the reference is outside the picture, pixels of its corners do not tell: the map is judged on the ground alone.
+    Where the reference is outside the picture, pixels of its corners do not tell: the map is judged on the ground.
     """
     has_map = np.isfinite(watched.scale_m_per_px) & ~watched.carried
     return np.array(

@@ -19,7 +19,9 @@ from standoff.core.errors import OutputError
 from standoff.evaluation.paper.benchmark_polynomial import DEGREE, KEPT_SD, MEDIAN_FRAMES
 from standoff.evaluation.paper.captions import ISOLATES, board_caption, number_text, pair_caption, published_for
 from standoff.evaluation.paper.figures import ESTIMATE, RAW, TREND, board_chart, corner_chart, pair_chart
+from standoff.evaluation.paper.map_only import NEAR_M
 from standoff.evaluation.paper.pairs import AFTER, BEFORE, PairSeries
+from standoff.evaluation.paper.pooled import pool
 from standoff.evaluation.paper.rectified import failed_frames
 from standoff.evaluation.paper.result import ClipResult
 from standoff.evaluation.paper.snapshots import Snapshot
@@ -54,7 +56,7 @@ def write_report(
 def render(results: Sequence[ClipResult], failures: Mapping[str, Exception]) -> str:
     """Return the page."""
     environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True)
-    environment.filters.update(number=number_text, percent=_percent, picture=_data_uri, words=_words)
+    environment.filters.update(number=number_text, percent=_percent, metres=_metres, picture=_data_uri, words=_words)
     here, look = files("standoff.evaluation.paper"), files("standoff.stages.sinks")
     template = environment.from_string((here / "report.html.j2").read_text(encoding="utf-8"))
     css = (look / "report.css").read_text(encoding="utf-8") + (here / "report.css").read_text(encoding="utf-8")
@@ -66,6 +68,8 @@ def render(results: Sequence[ClipResult], failures: Mapping[str, Exception]) -> 
         clips=[_section(result) for result in results],
         colours={"estimate": ESTIMATE, "raw": RAW, "trend": TREND},
         failures=failures,
+        pooled=pool(results),
+        near_m=NEAR_M,
         isolates=ISOLATES,
         after=AFTER,
         before=BEFORE,
@@ -89,6 +93,7 @@ def _section(result: ClipResult) -> dict[str, Any]:
         "size_px": watched.size_px if watched else None,
         "figures": result.figures(),
         "rectification": result.rectification,
+        "map_only": result.map_only,
         "localisation": result.localisation,
         "groups": result.groups,
         "board": result.board,
@@ -115,6 +120,11 @@ def _pair_figure(result: ClipResult, series: PairSeries) -> dict[str, Any]:
 
 def _percent(share: float) -> str:
     return f"{100.0 * share:.1f} %" if math.isfinite(share) else "none"
+
+
+def _metres(value: float) -> str:
+    """Errors of a map are centimetres."""
+    return f"{value:.3f} m" if math.isfinite(value) else "none"
 
 
 def _words(value: object) -> str:

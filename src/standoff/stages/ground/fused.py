@@ -33,6 +33,7 @@ _MIN_SUPPORT = 0.4
 """Of the outline that should show, so much must be seen for the reference to count as seen in a frame."""
 
 _GATE_PX, _GATE_SIGMAS = 1.0, 4.0
+_SEARCH_AGAIN_S = 0.19
 _MAX_REFUSED_S = 1.0
 """When what is seen has contradicted what is predicted for so long, the search begins again."""
 
@@ -82,6 +83,7 @@ class FusedGround:
         self._last: SolidState | None = None
         self._box: FloatArray | None = None
         self._refused_since_s: float | None = None
+        self._failed: tuple[float, NoGroundMap] | None = None
 
     @property
     def description(self) -> dict[str, Any]:
@@ -142,6 +144,7 @@ class FusedGround:
 
     def _prior_for(self, size_px: tuple[int, int]) -> CameraPrior:
         if self._camera is None or self._size_px != size_px:
+            self.reset()
             self._place.check_size(size_px)
             given = self._given_camera
             try:
@@ -152,8 +155,6 @@ class FusedGround:
                     found=str(error),
                     fix="calibrate with pictures from the same camera mode as the video",
                 ) from error
-            if self._size_px is not None and self._size_px != size_px:
-                self._filter = PoseFilter()
             self._size_px = size_px
         return self._camera
 
@@ -182,10 +183,15 @@ class FusedGround:
             return None if carried else box
         if carried and not self._contradicted(box, time_s):
             return None
+        if self._failed is not None and 0.0 <= time_s - self._failed[0] < _SEARCH_AGAIN_S:
+            return None if carried else self._failed[1]
         camera, height = self._known()
         found = search_solid(gray, box, self._shape, camera, height)
         if isinstance(found, NoGroundMap):
+            # A search costs as much as many frames, and the next frame looks much like this one.
+            self._failed = (time_s, found) if self._remember else None
             return None if carried else found
+        self._failed = None
         self._begin(found, time_s)
         return None
 

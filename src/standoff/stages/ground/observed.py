@@ -20,7 +20,7 @@ from standoff.stages.ground.marker_fit import PointFit, agreeing, first_fit, fit
 from standoff.stages.ground.marker_observer import MarkerObserver
 from standoff.stages.ground.observation import PointObservation
 from standoff.stages.ground.params import ObservedParams
-from standoff.stages.ground.pose_filter import PoseFilter
+from standoff.stages.ground.pose_filter import LASTING_SHARE, PoseFilter
 from standoff.stages.ground.pose_map import length_sigma, map_from_view, middle_scale_m_per_px
 from standoff.stages.ground.since import MotionSince
 from standoff.stages.ground.sizes_view import SizesView
@@ -211,7 +211,7 @@ class ObservedGround:
         seen = self._markers.observe(moment.frame.picture.gray(), guess, moment.frame.time_s)
         if not seen:
             self._refused_since_s = None
-            return None if followed and self._sigma() <= self._params.max_scale_sigma else NO_MARKER
+            return None if followed and self.length_sigma <= self._params.max_scale_sigma else NO_MARKER
         if followed and not self._contradicted(seen, moment.frame.time_s):
             return None
         fit = first_fit(seen, self._lens().camera, self._start_prior(moment), self._place_sigma_m)
@@ -268,14 +268,14 @@ class ObservedGround:
         if not self._params.telemetry or telemetry is None:
             return ""
         own = self._source == "telemetry"
-        if own and moment.carried and self._sigma() <= _WORSE * self._begun_sigma:
+        if own and moment.carried and self.length_sigma <= _WORSE * self._begun_sigma:
             return None
         self._first = telemetry if self._first is None else self._first
         read = telemetry_view(telemetry, self._first, self._lens())
         if isinstance(read, NoGroundMap):
             return read.reason
         view, covariance = read
-        if moment.carried and self._source == "markers" and length_sigma(view, covariance) >= self._sigma():
+        if moment.carried and self._source == "markers" and length_sigma(view, covariance) >= self.length_sigma:
             return None
         if self._filter.now is not None and not own:
             view = in_frame_of(view, self._filter.now.state.view)
@@ -308,23 +308,24 @@ class ObservedGround:
         """Return whether another estimate is notably surer, or notably different: small changes only shake the map."""
         assert self._filter.now is not None
         height_m = self._filter.now.state.view.position_m[2]
-        sigma = self._sigma()
+        sigma = self.length_sigma
         other = abs(float(np.log(view.position_m[2] / height_m))) > sigma / 2.0
         return length_sigma(view, covariance) < 0.9 * sigma or (other and self._source == "sizes")
 
     def _begin(self, source: Source, view: View, covariance: FloatArray, moment: _Moment) -> None:
-        self._filter.start(belief_of(view, covariance), moment.frame.time_s)
+        self._filter.start(belief_of(view, covariance), moment.frame.time_s, lasting_share=LASTING_SHARE)
         self._since.begin(moment.frame.time_s, moment.motion)
         self._source, self._refused_since_s = source, None
-        self._begun_sigma = self._sigma()
+        self._begun_sigma = self.length_sigma
 
-    def _sigma(self) -> float:
-        """Return the relative standard error of lengths now."""
+    @property
+    def length_sigma(self) -> float:
+        """Relative standard error of lengths in the middle of the picture now; infinite before the first map."""
         now = self._filter.now
         return np.inf if now is None else length_sigma(now.state.view, now.total[:CHANGES, :CHANGES])
 
     def _map(self, time_s: float) -> GroundMap | NoGroundMap:
-        now, sigma = self._filter.now, self._sigma()
+        now, sigma = self._filter.now, self.length_sigma
         assert now is not None and self._source is not None
         if not sigma <= self._params.max_scale_sigma:
             return NoGroundMap(f"{NOT_SURE}; {HELP}")

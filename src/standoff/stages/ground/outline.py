@@ -43,7 +43,7 @@ class OutlineFinder:
         camera: Camera | None = None,
         believable: Callable[[FloatArray], bool] = lambda _: True,
     ) -> None:
-        self.params = params if params is not None else ReferenceParams()
+        self.params = params if params is not None else ReferenceParams(method="oriented")
         self.camera = camera
         self._believable = believable
         self._pairs = sample_pairs(self.params.iterations, self.params.seed)

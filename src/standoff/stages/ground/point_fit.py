@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
-import cv2
 import numpy as np
 
+from standoff.core import homography
 from standoff.core.camera import Camera, CameraPrior
 from standoff.core.errors import GroundError
 from standoff.core.homography import FloatArray
-from standoff.core.pose import CHANGES, LENS, SHIFT, TURN, View
+from standoff.core.pose import CHANGES, LENS, SHIFT, TURN, View, poses_of_plane, rotation_from_vector
 from standoff.stages.ground.observation import PointObservation
 from standoff.stages.ground.solid import STATE, SolidState
 from standoff.stages.ground.solid_fit import Belief
@@ -50,7 +48,7 @@ def fit_points(prior: Belief, observation: PointObservation) -> Belief:
         rows, values = _weighted(state, observation)
         information = prior.information + rows.T @ rows
         pull = rows.T @ values - prior.information @ state.change_from(prior.state)
-        change = np.linalg.solve(information, pull)
+        change = np.asarray(np.linalg.solve(information, pull), dtype=np.float64)
         following, better = _downhill(prior, observation, state, change)
         if not better < cost:
             break
@@ -93,8 +91,9 @@ def belief_from_points(camera: CameraPrior, observation: PointObservation) -> Be
     if np.isfinite(pinhole_px).all():
         for view in views_of_plane(pinhole_px, observation.points_m[:, :2], camera.camera):
             prior = _prior(camera, view, observation)
-            fit = fit_points(prior, observation)
-            fits.append((_cost(prior, fit.state, observation), fit))
+            if np.isfinite(_cost(prior, prior.state, observation)):
+                fit = fit_points(prior, observation)
+                fits.append((_cost(prior, fit.state, observation), fit))
     if not fits:
         raise GroundError(
             expected=f"{observation.name} as a camera above the ground sees it",
@@ -104,33 +103,32 @@ def belief_from_points(camera: CameraPrior, observation: PointObservation) -> Be
     return min(fits, key=lambda one: one[0])[1]
 
 
-def views_of_plane(
-    pinhole_px: FloatArray, points_m: FloatArray, camera: Camera, limit_px: float = np.inf
-) -> Iterator[View]:
-    """Give the views from above in which points of the plane z = 0 are seen at given places, the better one first.
+def views_of_plane(pinhole_px: FloatArray, points_m: FloatArray, camera: Camera) -> list[View]:
+    """Return the two views from above in which a plane looks about so, the better one first.
+
+    Seen from afar, a plane tilted towards the camera and one tilted as much away from it look alike. OpenCV's closed
+    form (IPPE) gives both as well, but loses its way where a plane is seen from straight above.
 
     Args:
         pinhole_px: (N, 2) undistorted, N >= 4.
-        points_m: (N, 2) site frame.
+        points_m: (N, 2) of the plane z = 0, site frame.
         camera: Lens.
-        limit_px: Views are left out that put the points further off than this, root mean square.
-
-    Source:
-        Collins and Bartoli, Infinitesimal plane-based pose estimation, 2014.
     """
-    places = np.column_stack([points_m, np.zeros(len(points_m))])
-    middle = places.mean(axis=0)
-    found, turns, shifts, errors = cv2.solvePnPGeneric(
-        places - middle, pinhole_px[:, None], camera.matrix, None, flags=cv2.SOLVEPNP_IPPE
-    )
-    for k in range(found):
-        if not float(np.ravel(errors[k])[0]) <= limit_px:
-            continue
-        left, _, right = np.linalg.svd(cv2.Rodrigues(turns[k])[0])
-        rotation = left @ right
-        view = View(camera, middle - rotation.T @ shifts[k].ravel(), rotation)
-        if view.position_m[2] > 0:
-            yield view
+    normalised = (pinhole_px - camera.matrix[:2, 2]) / np.array([camera.matrix[0, 0], camera.matrix[1, 1]])
+    plane_to_camera = homography.signed(homography.fit(points_m, normalised), points_m.mean(axis=0))
+    rotation, position_m = poses_of_plane(plane_to_camera)
+    if not np.isfinite(position_m).all() or position_m[2] <= 0:
+        return []
+    middle = np.append(points_m.mean(axis=0), 0.0)
+    place = rotation @ (middle - position_m)
+    # The plane's normal, mirrored at the line of sight: a turn about what is perpendicular to both, twice as far.
+    sight, normal = place / np.linalg.norm(place), rotation[:, 2]
+    axis = np.cross(sight, -normal)
+    angle = np.arctan2(np.linalg.norm(axis), -sight @ normal)
+    axis /= max(float(np.linalg.norm(axis)), 1e-12)
+    other = rotation_from_vector(-2.0 * angle * axis) @ rotation
+    views = [View(camera, position_m, rotation), View(camera, middle - other.T @ place, other)]
+    return [view for view in views if view.position_m[2] > 0]
 
 
 def _prior(camera: CameraPrior, view: View, observation: PointObservation) -> Belief:

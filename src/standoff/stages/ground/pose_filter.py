@@ -21,7 +21,7 @@ from standoff.stages.ground.solid_fit import Belief
 _SAME_S, _SAME_UNSURE_S = 0.5, 4.0
 """The second while the lens is unsure: errors of edges are then taken for the lens's, the same in each frame."""
 
-_LASTING_SHARE, _LASTING_UNSURE_SHARE = 0.3, 1.0
+LASTING_SHARE, _LASTING_UNSURE_SHARE = 0.3, 1.0
 """Of one observation's variance so much is there in each and never averages out."""
 
 _SURE_FOCAL_SIGMA = 0.02
@@ -69,9 +69,10 @@ class PoseFilter:
         self._by_key = np.eye(STATE)
         self._motion: CameraMotion | NoCameraMotion = NoCameraMotion("not yet")
         self._key_motion: CameraMotion | NoCameraMotion = self._motion
+        self._lost: tuple[Estimate, float] | None = None
         self._observed_s = -np.inf
         self._lasting_trace = np.inf
-        self._same_s, self._lasting_share = _SAME_S, _LASTING_SHARE
+        self._same_s, self._lasting_share = _SAME_S, LASTING_SHARE
         self._height_doubt_m2 = np.zeros((STATE, STATE))
 
     @property
@@ -84,8 +85,18 @@ class PoseFilter:
         """When an observation was last taken in; minus infinity before the first."""
         return self._observed_s
 
-    def start(self, belief: Belief, time_s: float, *, height_known: bool = True) -> None:
-        """Begin, or begin again, with a belief about this frame; say whether the height was measured by hand."""
+    def start(
+        self, belief: Belief, time_s: float, *, height_known: bool = True, lasting_share: float | None = None
+    ) -> None:
+        """Begin, or begin again, with a belief about this frame.
+
+        Args:
+            belief: What is known now.
+            time_s: Of the frame.
+            height_known: Whether the solid's height was measured by hand.
+            lasting_share: Of the belief's covariance, what is there in every frame and never averages out; None: what
+                edges of a reference leave, more of it while the lens is unsure.
+        """
         covariance = _inverse(belief.information)
         lens_sure = covariance[6, 6] < _SURE_FOCAL_SIGMA**2
         self._height_doubt_m2 = np.zeros((STATE, STATE))
@@ -95,8 +106,11 @@ class PoseFilter:
             together[[5, HEIGHT]] = _GUESSED_HEIGHT_SIGMA_M
             self._height_doubt_m2 = np.outer(together, together)
         self._same_s = _SAME_S if lens_sure else _SAME_UNSURE_S
-        self._lasting_share = _LASTING_SHARE if lens_sure else _LASTING_UNSURE_SHARE
+        self._lasting_share = LASTING_SHARE if lens_sure else _LASTING_UNSURE_SHARE
+        if lasting_share is not None:
+            self._lasting_share = lasting_share
         lasting = self._lasting_share * covariance + self._height_doubt_m2
+        self._lost = None
         self._now = Estimate(belief.state, covariance, lasting)
         self._now_s = self._observed_s = time_s
         self._lasting_trace = _spread_m2(lasting)
@@ -115,10 +129,11 @@ class PoseFilter:
         carried = None if since_key is None else carry(self._key.state.view, since_key, self._now.state.view)
         self._motion = motion
         if carried is None:
-            self._drift(max(time_s - self._now_s, 0.0))
+            self._drift(time_s)
             self._now_s = time_s
             self._rekey()
             return False
+        self._lost = None
         self._by_key = carried.by_key
         self._now = Estimate(
             SolidState(carried.view, self._key.state.height_m),
@@ -147,12 +162,13 @@ class PoseFilter:
         self._key = Estimate(
             self._key.state.changed(gain @ change),
             (key_covariance + key_covariance.T) / 2.0,
-            self._key.lasting if lasting is None else gain @ lasting @ gain.T,
+            self._key.lasting if lasting is None else _carried_back(lasting, self._by_key),
         )
         self._now = Estimate(
             self._now.state.changed(change), covariance, self._now.lasting if lasting is None else lasting
         )
         self._observed_s = self._now_s
+        self._lost = None
 
     def _lasting(self, before: FloatArray, information: FloatArray) -> FloatArray | None:
         """Return the lasting covariance that goes with the best observation so far, or None if it is an earlier one.
@@ -189,11 +205,20 @@ class PoseFilter:
         self._key, self._key_s, self._key_motion = self._now, self._now_s, self._motion
         self._by_key = np.eye(STATE)
 
-    def _drift(self, seconds: float) -> None:
+    def _drift(self, time_s: float) -> None:
+        """Let the belief widen, from when the picture was lost on, as fast as a drone may move."""
         assert self._now is not None
-        sigma = np.array([_FLIGHT_RADPS] * 3 + [_FLIGHT_MPS] * 3 + [0.0] * 3) * seconds
-        covariance = self._now.covariance + np.diag(sigma**2)
-        self._now = Estimate(self._now.state, covariance, self._now.lasting)
+        if self._lost is None:
+            self._lost = self._now, self._now_s
+        estimate, lost_s = self._lost
+        sigma = np.array([_FLIGHT_RADPS] * 3 + [_FLIGHT_MPS] * 3 + [0.0] * 3) * max(time_s - lost_s, 0.0)
+        self._now = Estimate(estimate.state, estimate.covariance + np.diag(sigma**2), estimate.lasting)
+
+
+def _carried_back(covariance: FloatArray, by_key: FloatArray) -> FloatArray:
+    """Return a covariance of the state now as one of the state at the keyframe."""
+    back = _inverse(by_key)
+    return back @ covariance @ back.T
 
 
 def _inverse(matrix: FloatArray) -> FloatArray:

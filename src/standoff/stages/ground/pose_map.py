@@ -8,8 +8,6 @@ from standoff.core.homography import FloatArray, invert, point_jacobian
 from standoff.core.pose import CHANGES, View
 from standoff.core.types import GroundMap
 
-_STEP = np.array([1e-5] * 3 + [1e-4] * 3 + [1e-5] * 2)
-
 
 def map_from_view(
     view: View,
@@ -34,15 +32,8 @@ def map_from_view(
         size_sigma: Standard error of all lengths at once, as a share of them: of the tape measure.
         middle_m: (2,) the place that such an error leaves where it is; None: the origin.
     """
-    entries = _entries(view)
-    by_view = np.zeros((10, CHANGES))
-    for k in range(CHANGES):
-        step = np.zeros(CHANGES)
-        step[k] = _STEP[k]
-        by_view[:9, k] = (_entries(view.changed(step)) - _entries(view.changed(-step))) / (2.0 * _STEP[k])
-    by_view[9, 7] = 1.0
+    matrix, by_view = _entries_with_jacobian(view)
     total = by_view @ covariance @ by_view.T
-    matrix = entries.reshape(3, 3)
     if size_sigma > 0:
         middle = np.zeros(2) if middle_m is None else middle_m
         stretch = np.zeros((3, 3))
@@ -61,11 +52,29 @@ def map_from_view(
     )
 
 
-def _entries(view: View) -> FloatArray:
-    """Return the nine entries of the signed map from undistorted pixels to the ground, at unit norm."""
-    matrix = invert(view.plane_to_pinhole())
-    entries: FloatArray = (matrix / np.linalg.norm(matrix)).ravel()
-    return entries
+def _entries_with_jacobian(view: View) -> tuple[FloatArray, FloatArray]:
+    """Return the signed map from undistorted pixels to the ground, at unit norm, and its derivative by the view.
+
+    Returns:
+        (3, 3), and (10, 8) of its entries and of the lens's k1.
+    """
+    forth = view.plane_to_pinhole()
+    back = invert(forth)
+    camera = view.camera.matrix
+    to_camera = np.linalg.solve(camera, forth)
+    by_forth = np.zeros((CHANGES, 3, 3))
+    for k, axis in enumerate(np.eye(3)):
+        by_forth[k] = camera @ np.cross(axis, to_camera, axisb=0).T
+        by_forth[3 + k, :, 2] = -camera @ view.site_to_camera[:, k]
+    by_forth[6, :2] = np.diag(camera)[:2, None] * to_camera[:2]
+    # The inverse moves by -back d(forth) back; of that only what is across the entries' own direction keeps the norm.
+    slopes = -(back @ by_forth @ back).reshape(CHANGES, 9)
+    norm = float(np.linalg.norm(back))
+    entries = (back / norm).ravel()
+    by_view = np.zeros((10, CHANGES))
+    by_view[:9] = (slopes - np.outer(slopes @ entries, entries)).T / norm
+    by_view[9, 7] = 1.0
+    return entries.reshape(3, 3), by_view
 
 
 _AT = np.array([[0.45, 0.6], [0.55, 0.6], [0.5, 0.52], [0.5, 0.68]])

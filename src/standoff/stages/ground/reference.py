@@ -58,7 +58,7 @@ class ReferenceGround:
         camera: Camera | None = None,
     ) -> None:
         self._shape = shape
-        self._params = params if params is not None else ReferenceParams()
+        self._params = params if params is not None else ReferenceParams(method="oriented")
         self._given = place if place is not None else GivenPlace()
         self._given_camera = camera
         self._camera = camera

@@ -35,6 +35,10 @@ class _Sizes:
     sigmas: deque[float]
     at_once: int = 0
 
+    def log_likely(self) -> tuple[float, float]:
+        """Return the factor of which most are nearest, as a logarithm, and the inverse of its variance."""
+        return float(np.median(self.logs)), float(np.median(self.sigmas)) ** -2
+
     def log_factor(self) -> float:
         """Return the factor that most agree on, as a logarithm; 0 where they do not agree on a direction."""
         high, low = np.quantile(self.logs, [_AGREED_SHARE, 1.0 - _AGREED_SHARE])
@@ -60,7 +64,7 @@ class ScaleWatch:
         self._sizes = {name: _Sizes(deque(maxlen=_MOST_SIZES), deque(maxlen=_MOST_SIZES)) for name in _GROUPS}
         self._sampled_s = -np.inf
         self._refusal = ""
-        self._worst_log = 0.0
+        self._warning, self._worst_log = "", 0.0
 
     @property
     def description(self) -> dict[str, Any]:
@@ -108,30 +112,33 @@ class ScaleWatch:
             sizes.at_once = max(sizes.at_once, int(mine.sum()))
 
     def _judge(self) -> None:
-        log_factor, seen, at_once, names = self._agreed()
+        log_factor, seen, at_once = self._agreed()
         enough = at_once >= _FEWEST_ENTITIES
-        if enough and seen >= _FEWEST_TO_WARN and abs(log_factor) >= np.log(WARNING_FACTOR):
-            self._worst_log = max(self._worst_log, log_factor, key=abs)
+        if enough and seen >= _FEWEST_TO_WARN and abs(log_factor) >= max(np.log(WARNING_FACTOR), self._worst_log):
+            self._worst_log, self._warning = abs(log_factor), self._clause()
         if not (enough and seen >= _FEWEST_TO_REFUSE and abs(log_factor) >= np.log(REFUSAL_FACTOR)):
             self._refusal = ""
         elif not self._refusal:
             # The words stay the same as long as the cause does, so that it can be counted.
-            self._refusal = _clause(log_factor, names)
+            self._refusal = self._clause()
 
-    def _agreed(self) -> tuple[float, int, int, str]:
-        """Return the factor's logarithm, how many sizes it rests on, of how many at once at least, and whose."""
-        groups = {name: sizes for name, sizes in self._sizes.items() if len(sizes.logs)}
+    def _agreed(self) -> tuple[float, int, int]:
+        """Return the least factor that all speak for, as a logarithm, how many sizes say so, of how many at once."""
+        groups = [sizes for sizes in self._sizes.values() if sizes.logs]
         if not groups:
-            return 0.0, 0, 0, ""
-        factors = [sizes.log_factor() for sizes in groups.values()]
+            return 0.0, 0, 0
+        factors = [sizes.log_factor() for sizes in groups]
         log_factor = min(factors, key=abs) if min(factors) > 0 or max(factors) < 0 else 0.0
-        seen = sum(len(sizes.logs) for sizes in groups.values())
-        return log_factor, seen, sum(sizes.at_once for sizes in groups.values()), " and ".join(groups)
+        return log_factor, sum(len(sizes.logs) for sizes in groups), sum(sizes.at_once for sizes in groups)
 
     def _warnings(self) -> list[str]:
-        if not self._worst_log:
-            return []
-        return [f"seen through the ground map, {_clause(self._worst_log, self._agreed()[3])}"]
+        return [f"seen through the ground map, {self._warning}"] if self._warning else []
+
+    def _clause(self) -> str:
+        """Say how large people and machines look, and which unit was probably meant."""
+        groups = {name: sizes.log_likely() for name, sizes in self._sizes.items() if sizes.logs}
+        weights = sum(weight for _, weight in groups.values())
+        return _clause(sum(log * weight for log, weight in groups.values()) / weights, " and ".join(groups))
 
 
 def _clause(log_factor: float, names: str) -> str:

@@ -76,17 +76,26 @@ class SolidFit:
     lower_side: IntArray
     scatter_px: float
 
-    def side_support(self, count: int) -> FloatArray:
-        """Return (count,) the share of each side's upper or lower edge, the better one, that the picture has."""
-        upper = np.nan_to_num(self.support[:count], nan=0.0)
-        lower = np.flatnonzero(self.lower_side >= 0)
-        np.maximum.at(upper, self.lower_side[lower], np.nan_to_num(self.support[lower], nan=0.0))
-        return upper
-
     def seen_share(self, count: int) -> float:
         """Return the share of the whole outline, of `count` sides, that the picture has."""
         length = self.length_px[:count]
-        return float(self.side_support(count) @ length / length.sum()) if length.sum() > 0 else 0.0
+        if not length.sum() > 0:
+            return 0.0
+        return float(side_support(self.support, self.lower_side, count) @ length / length.sum())
+
+
+def side_support(support: FloatArray, lower_side: IntArray, count: int) -> FloatArray:
+    """Return (count,) the share of each side's upper or lower edge, the better one, that the picture has.
+
+    Args:
+        support: (E,) of each visible edge; NaN counts as 0.
+        lower_side: (E,) the side whose lower edge each is, or -1.
+        count: Sides of the outline, whose upper edges come first.
+    """
+    upper = np.nan_to_num(support[:count], nan=0.0)
+    lower = np.flatnonzero(lower_side >= 0)
+    np.maximum.at(upper, lower_side[lower], np.nan_to_num(support[lower], nan=0.0))
+    return upper
 
 
 def fit_solid(
@@ -254,9 +263,13 @@ def _associated(
 
 def _medians(residual: FloatArray, found: BoolArray, samples: EdgeSamples) -> FloatArray:
     """Return (E,) the median residual of each edge; 0 where nothing was found."""
-    medians = np.zeros(len(samples.length_px))
-    for edge in np.unique(samples.edge[found]):
-        medians[edge] = np.median(residual[found & (samples.edge == edge)])
+    edge, residual = samples.edge[found], residual[found]
+    ordered = residual[np.lexsort((residual, edge))]
+    counts = np.bincount(edge, minlength=len(samples.length_px))
+    there = np.flatnonzero(counts)
+    first = (np.cumsum(counts) - counts)[there]
+    medians = np.zeros(len(counts))
+    medians[there] = (ordered[first + (counts[there] - 1) // 2] + ordered[first + counts[there] // 2]) / 2.0
     return medians
 
 

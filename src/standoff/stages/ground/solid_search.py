@@ -20,18 +20,18 @@ from standoff.core.types import ImageArray, NoGroundMap
 from standoff.stages.ground.edges import between_pixels, canny, sobel_gradients
 from standoff.stages.ground.oriented import likely_quadrilaterals, noise_thresholds
 from standoff.stages.ground.outline import BOX_OUTSIDE, TOO_FEW_EDGES, undistorted_box
-from standoff.stages.ground.point_fit import views_of_plane
 from standoff.stages.ground.quadrilateral import NO_QUADRILATERAL, ORDERS
 from standoff.stages.ground.shape import ReferenceShape
+from standoff.stages.ground.silhouette import silhouettes
 from standoff.stages.ground.solid import HEIGHT, STATE, SolidState
 from standoff.stages.ground.solid_edges import Blurred
-from standoff.stages.ground.solid_fit import Belief, SolidFit, fit_solid, outline_support
+from standoff.stages.ground.solid_fit import Belief, SolidFit, fit_solid, outline_support, side_support
 
 AMBIGUOUS = "the reference could lie in two ways"
 NOT_THERE = "no solid of the reference's shape fits the edges in its box"
 
 _MIN_EDGES = 16
-_QUADRILATERALS = 24
+_QUADRILATERALS, _MIXED = 24, 6
 _MARGIN = 0.12
 """The search goes this share of the box's longer side beyond the box: detectors cut corners."""
 
@@ -42,7 +42,7 @@ _ROLL_SIGMA_RAD = np.deg2rad(5.0)
 _MAX_ROLL_RAD = np.deg2rad(30.0)
 _MIN_PITCH_RAD = np.deg2rad(5.0)
 _BARE_COST, _ROLL_COST, _PATCHY = 0.45, 0.1, 0.33
-_REFINED = 4
+_REFINED = 10
 _FIT_PX = 5.0
 _RIVAL_SCORE, _RIVAL_PX = 0.9, 4.0
 _MIN_SIDE_SUPPORT, _MIN_MEAN_SUPPORT, _MIN_OTHER_SUPPORT = 0.5, 0.8, 0.85
@@ -138,6 +138,10 @@ def _search(
     if not states:
         return NoGroundMap(NO_QUADRILATERAL)
     scores = np.array([_score(picture, shape, state, box) for state in states])
+    leading = [states[k] for k in np.argsort(-scores, kind="stable")[:_MIXED]]
+    mixed = [other for state in leading for other in _mixed(state, shape)]
+    states += mixed
+    scores = np.concatenate([scores, [_score(picture, shape, state, box) for state in mixed]])
     fits: list[tuple[float, Found]] = []
     for k in np.argsort(-scores, kind="stable")[: _REFINED * len(height.tried_m)]:
         if len(fits) == _REFINED:
@@ -145,7 +149,7 @@ def _search(
         prior = _prior(states[k], camera, height)
         fit = fit_solid(gray, shape, prior, _FIT_PX, start=states[k])
         if fit is not None and _believable(fit, shape):
-            score = _score(picture, shape, fit.state, box)
+            score = _score_of(fit.support, fit.length_px, picture, shape, fit.state, box)
             if score > 0:
                 fits.append((score, Found(fit, prior)))
     return _best(fits, shape)
@@ -178,7 +182,7 @@ def _smoothed_in(gray: ImageArray, box: FloatArray, smoothing_px: float) -> Imag
 def _believable(fit: SolidFit, shape: ReferenceShape) -> bool:
     """Return whether the picture has enough of the sides: of every one, or of all but one and of the solid below."""
     count = len(shape.corners_m)
-    sides = np.sort(fit.side_support(count))
+    sides = np.sort(side_support(fit.support, fit.lower_side, count))
     if sides[0] >= _MIN_SIDE_SUPPORT and sides.mean() >= _MIN_MEAN_SUPPORT:
         return True
     lower = fit.support[(fit.lower_side >= 0) & np.isfinite(fit.support)]
@@ -219,11 +223,31 @@ def _states(outline: FloatArray, shape: ReferenceShape, camera: Camera, height: 
                     yield SolidState(lifted, height_m)
 
 
+def _mixed(state: SolidState, shape: ReferenceShape) -> Iterator[SolidState]:
+    """Give the states in which some sides of an outline taken for the top's are the lower edges of these sides."""
+    outline_px = state.view.project_pinhole(
+        np.column_stack([shape.corners_m, np.full(len(shape.corners_m), state.height_m)])
+    )
+    if np.isfinite(outline_px).all() and state.height_m > 0:
+        yield from silhouettes(state, outline_px, shape)
+
+
 def _views(corners_px: FloatArray, shape: ReferenceShape, camera: Camera, limit_px: float) -> Iterator[View]:
     """Give the views from above, nearly level, from which the shape at z = 0 has these corners."""
-    for view in views_of_plane(corners_px, shape.corners_m, camera, limit_px):
+    places = np.column_stack([shape.corners_m, np.zeros(len(shape.corners_m))])
+    middle = places.mean(axis=0)
+    found, turns, shifts, errors = cv2.solvePnPGeneric(
+        places - middle, corners_px[:, None], camera.matrix, None, flags=cv2.SOLVEPNP_IPPE
+    )
+    for k in range(found):
+        if float(np.ravel(errors[k])[0]) > limit_px:
+            continue
+        rotation = cv2.Rodrigues(turns[k])[0]
+        left, _, right = np.linalg.svd(rotation)
+        rotation = left @ right
+        view = View(camera, middle - rotation.T @ shifts[k].ravel(), rotation)
         roll, pitch = _roll_and_pitch(view)
-        if abs(roll) < _MAX_ROLL_RAD and pitch > _MIN_PITCH_RAD:
+        if view.position_m[2] > 0 and abs(roll) < _MAX_ROLL_RAD and pitch > _MIN_PITCH_RAD:
             yield view
 
 
@@ -237,10 +261,30 @@ def _roll_and_pitch(view: View) -> tuple[float, float]:
 
 
 def _score(picture: Blurred, shape: ReferenceShape, state: SolidState, box: FloatArray) -> float:
-    """Return px of outline that the picture has, less what is bare of the top, less what is unlikely."""
+    """Return px of outline that the picture has where a state puts it, as `_score_of`."""
     samples, support = outline_support(picture, shape, state)
+    return _score_of(support, samples.length_px, picture, shape, state, box)
+
+
+def _score_of(
+    support: FloatArray,
+    length: FloatArray,
+    picture: Blurred,
+    shape: ReferenceShape,
+    state: SolidState,
+    box: FloatArray,
+) -> float:
+    """Return px of outline that the picture has, less what is bare of the top, less what is unlikely.
+
+    Args:
+        support: (E,) share of each visible edge that the picture has.
+        length: (E,) of each, px.
+        picture: Around the reference.
+        shape: Its.
+        state: Where it is.
+        box: (4,) where it was detected.
+    """
     support = np.nan_to_num(support, nan=0.0)
-    length = samples.length_px
     corners = len(shape.corners_m)
     top = float((length[:corners] * (support[:corners] - _BARE_COST)).sum())
     lower = float((length[corners:] * np.maximum(support[corners:] - _BARE_COST, 0.0)).sum())

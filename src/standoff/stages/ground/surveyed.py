@@ -195,7 +195,8 @@ def _scaled(surveyed: GroundMap, size_px: tuple[int, int]) -> GroundMap | NoGrou
         return NoGroundMap("picture size differs from the survey")
     shift = (scale - 1.0) / 2.0
     to_surveyed = np.linalg.inv(np.array([[scale[0], 0.0, shift[0]], [0.0, scale[1], shift[1]], [0.0, 0.0, 1.0]]))
-    by_entries = np.kron(np.eye(3), to_surveyed.T)
+    by_entries = np.eye(len(surveyed.covariance))
+    by_entries[:9, :9] = np.kron(np.eye(3), to_surveyed.T)
     return replace(
         surveyed,
         image_to_ground=surveyed.image_to_ground @ to_surveyed,
