@@ -166,7 +166,7 @@ def test_a_killed_process_leaves_readable_parts(tmp_path: Path) -> None:
     process = subprocess.Popen(
         [sys.executable, "-c", script, str(tmp_path / "tracks.parquet")],
         stdout=subprocess.PIPE,
-        env={**os.environ, "PYTHONPATH": tests},
+        env=os.environ | {"PYTHONPATH": os.pathsep.join([tests, os.environ.get("PYTHONPATH", "")])},
     )
     with process:
         assert process.stdout is not None
