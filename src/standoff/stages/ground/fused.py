@@ -9,7 +9,6 @@ import numpy as np
 
 from standoff.core import homography
 from standoff.core.camera import CameraPrior
-from standoff.core.errors import GroundError
 from standoff.core.homography import FloatArray
 from standoff.core.pose import CHANGES
 from standoff.core.types import CameraMotion, Detections, Frame, GroundMap, ImageArray, NoCameraMotion, NoGroundMap
@@ -17,6 +16,7 @@ from standoff.stages.ground.basis import BETTER_REFERENCE, lens_text, reference_
 from standoff.stages.ground.params import ReferenceParams
 from standoff.stages.ground.pose_filter import PoseFilter
 from standoff.stages.ground.pose_map import map_from_view
+from standoff.stages.ground.prior_for import prior_for
 from standoff.stages.ground.reference import rectified_scale_m_per_px
 from standoff.stages.ground.shape import ReferenceShape
 from standoff.stages.ground.solid import HEIGHT, SolidState
@@ -137,7 +137,7 @@ class FusedGround:
         self._carry_box(carried)
         seen = self._filter.now is not None and self._look(gray, carried)
         if not seen:
-            reason = self._search(gray, frame.time_s, detections, carried)
+            reason = self._search(gray, frame.time_s, detections, motion, carried)
             if isinstance(reason, NoGroundMap):
                 return reason
         return self._map(frame)
@@ -146,15 +146,7 @@ class FusedGround:
         if self._camera is None or self._size_px != size_px:
             self.reset()
             self._place.check_size(size_px)
-            given = self._given_camera
-            try:
-                self._camera = CameraPrior.unknown(*size_px) if given is None else given.scaled_to(*size_px)
-            except ValueError as error:
-                raise GroundError(
-                    expected="pictures of the shape that the camera was calibrated for",
-                    found=str(error),
-                    fix="calibrate with pictures from the same camera mode as the video",
-                ) from error
+            self._camera = prior_for(self._given_camera, size_px)
             self._size_px = size_px
         return self._camera
 
@@ -176,7 +168,14 @@ class FusedGround:
         self._noted(self._filter.now.state if self._filter.now is not None else fit.state)
         return True
 
-    def _search(self, gray: ImageArray, time_s: float, detections: Detections, carried: bool) -> NoGroundMap | None:
+    def _search(
+        self,
+        gray: ImageArray,
+        time_s: float,
+        detections: Detections,
+        motion: CameraMotion | NoCameraMotion,
+        carried: bool,
+    ) -> NoGroundMap | None:
         """Find the reference anew where it is known or detected to be; None where there is something to map with."""
         box = self._box_now(time_s, detections)
         if isinstance(box, NoGroundMap):
@@ -192,7 +191,7 @@ class FusedGround:
             self._failed = (time_s, found) if self._remember else None
             return None if carried else found
         self._failed = None
-        self._begin(found, time_s)
+        self._begin(found, time_s, motion)
         return None
 
     def _contradicted(self, box: FloatArray, time_s: float) -> bool:
@@ -205,10 +204,10 @@ class FusedGround:
             self._refused_since_s = time_s
         return time_s - self._refused_since_s >= _MAX_REFUSED_S
 
-    def _begin(self, found: Found, time_s: float) -> None:
+    def _begin(self, found: Found, time_s: float, motion: CameraMotion | NoCameraMotion) -> None:
         belief = found.belief()
         belief = turned_like(belief, self._shape, last=self._last, corner_px=self._hint())
-        self._filter.start(belief, time_s, height_known=self._given_height_m is not None)
+        self._filter.start(belief, time_s, motion, height_known=self._given_height_m is not None)
         self._refused_since_s = None
         self._noted(belief.state)
 

@@ -10,7 +10,6 @@ from typing import Any, Literal
 import numpy as np
 
 from standoff.core.camera import CameraPrior
-from standoff.core.errors import GroundError
 from standoff.core.homography import FloatArray
 from standoff.core.pose import CHANGES, LENS, View
 from standoff.core.telemetry import Telemetry
@@ -22,7 +21,7 @@ from standoff.stages.ground.observation import PointObservation
 from standoff.stages.ground.params import ObservedParams
 from standoff.stages.ground.pose_filter import LASTING_SHARE, PoseFilter
 from standoff.stages.ground.pose_map import length_sigma, map_from_view, middle_scale_m_per_px
-from standoff.stages.ground.since import MotionSince
+from standoff.stages.ground.prior_for import prior_for
 from standoff.stages.ground.sizes_view import SizesView
 from standoff.stages.ground.solid import STATE, SolidState
 from standoff.stages.ground.view_prior import (
@@ -88,7 +87,6 @@ class ObservedGround:
         if self._markers is not None:
             self._markers.reset()
         self._filter = PoseFilter()
-        self._since = MotionSince()
         self._camera: CameraPrior | None = None
         self._sizes: SizesView | None = None
         self._source: Source | None = None
@@ -179,15 +177,7 @@ class ObservedGround:
 
     def _prior_for(self, size_px: tuple[int, int]) -> CameraPrior:
         if self._camera is None or self._size_px != size_px:
-            given = self._given_camera
-            try:
-                camera = CameraPrior.unknown(*size_px) if given is None else given.scaled_to(*size_px)
-            except ValueError as error:
-                raise GroundError(
-                    expected="pictures of the shape that the camera was calibrated for",
-                    found=str(error),
-                    fix="calibrate with pictures from the same camera mode as the video",
-                ) from error
+            camera = prior_for(self._given_camera, size_px)
             self._filter, self._source = PoseFilter(), None
             self._camera, self._sizes, self._size_px = camera, SizesView(camera), size_px
         return self._camera
@@ -196,10 +186,7 @@ class ObservedGround:
         """Carry the belief to this frame; while nothing tells how the picture moved, it waits where it was."""
         if self._filter.now is None or isinstance(motion, NoCameraMotion):
             return False
-        carried = self._filter.predict(time_s, self._since.since(motion))
-        if not carried:
-            self._since.begin(time_s, motion)
-        return carried
+        return self._filter.predict(time_s, motion)
 
     def _look_at_markers(self, moment: _Moment) -> str | None:
         """Take in the markers in the picture; None: the frame needs nothing else, or why it does."""
@@ -313,8 +300,7 @@ class ObservedGround:
         return length_sigma(view, covariance) < 0.9 * sigma or (other and self._source == "sizes")
 
     def _begin(self, source: Source, view: View, covariance: FloatArray, moment: _Moment) -> None:
-        self._filter.start(belief_of(view, covariance), moment.frame.time_s, lasting_share=LASTING_SHARE)
-        self._since.begin(moment.frame.time_s, moment.motion)
+        self._filter.start(belief_of(view, covariance), moment.frame.time_s, moment.motion, lasting_share=LASTING_SHARE)
         self._source, self._refused_since_s = source, None
         self._begun_sigma = self.length_sigma
 

@@ -86,17 +86,25 @@ class PoseFilter:
         return self._observed_s
 
     def start(
-        self, belief: Belief, time_s: float, *, height_known: bool = True, lasting_share: float | None = None
+        self,
+        belief: Belief,
+        time_s: float,
+        motion: CameraMotion | NoCameraMotion,
+        *,
+        height_known: bool = True,
+        lasting_share: float | None = None,
     ) -> None:
         """Begin, or begin again, with a belief about this frame.
 
         Args:
             belief: What is known now.
             time_s: Of the frame.
+            motion: Of this frame, from which those of later ones are counted.
             height_known: Whether the solid's height was measured by hand.
             lasting_share: Of the belief's covariance, what is there in every frame and never averages out; None: what
                 edges of a reference leave, more of it while the lens is unsure.
         """
+        self._motion = motion
         covariance = _inverse(belief.information)
         lens_sure = covariance[6, 6] < _SURE_FOCAL_SIGMA**2
         self._height_doubt_m2 = np.zeros((STATE, STATE))
