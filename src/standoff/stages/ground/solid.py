@@ -132,10 +132,10 @@ def _strip_widths_px(shape: ReferenceShape, state: SolidState) -> FloatArray:
     corners = shape.corners_m
     following = np.roll(corners, -1, axis=0)
     middle = (corners + following) / 2.0
-    level = np.full(len(corners), state.height_m)
-    places = [np.column_stack([xy, z]) for xy, z in ((corners, level), (following, level), (middle, level))]
-    start, end, high = (state.view.project(place) for place in places)
-    low = state.view.project(np.column_stack([middle, 0.0 * level]))
+    height_m = state.height_m
+    ends_m = [(corners, height_m), (following, height_m), (middle, height_m), (middle, 0.0)]
+    places = np.concatenate([np.column_stack([xy, np.full(len(xy), z)]) for xy, z in ends_m])
+    start, end, high, low = state.view.project(places).reshape(4, len(corners), 2)
     along = end - start
     with np.errstate(invalid="ignore", divide="ignore"):
         across = np.column_stack([-along[:, 1], along[:, 0]]) / np.linalg.norm(along, axis=1)[:, None]
