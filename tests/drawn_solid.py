@@ -87,9 +87,21 @@ def drawn(
         sanded_side: A side with sand heaped against it up to the top.
         solid: Whether there is anything but ground.
     """
+    faces = [_faces(shape, state, sun_m, sanded_side)] if solid else []
+    return _photographed(faces, state.view, seed, noise)
+
+
+def drawn_solids(
+    solids: Sequence[tuple[ReferenceShape, SolidState]], view: View, *, seed: int = 0, noise: float = 1.5
+) -> ImageArray:
+    """Draw several that do not hide each other, as `drawn`."""
+    return _photographed([_faces(shape, state, None, None) for shape, state in solids], view, seed, noise)
+
+
+def _photographed(solids: Sequence[list[tuple[FloatArray, float]]], view: View, seed: int, noise: float) -> ImageArray:
     grey = _GROUND + _ROUGHNESS
-    if solid:
-        _paint(grey, state.view, _faces(shape, state, sun_m, sanded_side))
+    for faces in solids:
+        _paint(grey, view, faces)
     grey = cv2.GaussianBlur(grey, (0, 0), 0.7)
     grey += np.random.default_rng(seed).normal(0.0, noise, grey.shape)
     return np.asarray(np.clip(np.rint(grey), 0, 255), dtype=np.uint8)

@@ -8,7 +8,7 @@ import yaml
 from standoff.config import Settings, build_ground, build_pipeline, load_settings, resolved
 from standoff.core.errors import ConfigError, GroundError
 from standoff.core.types import Detections, Frame
-from standoff.stages.ground import FusedGround, ObservedGround, ScaleWatch, Unmapped
+from standoff.stages.ground import FusedGround, ScaleWatch, Unmapped
 from standoff.stages.hazard import HazardMonitor
 
 
@@ -162,13 +162,13 @@ def _inner(settings: Settings) -> object:
 
 
 def test_without_a_ground_there_is_one_by_what_the_source_tells() -> None:
-    assert isinstance(_inner(Settings()), ObservedGround)
+    assert isinstance(_inner(Settings()), FusedGround)
 
 
 def test_no_ground_at_all_has_to_be_asked_for() -> None:
     assert isinstance(build_ground(load_settings(overrides={"ground": {"auto": False}})), Unmapped)
     markers = {"auto": False, "markers": [{"size_m": 1.0}]}
-    assert isinstance(_inner(load_settings(overrides={"ground": markers})), ObservedGround)
+    assert isinstance(_inner(load_settings(overrides={"ground": markers})), FusedGround)
 
 
 @pytest.mark.parametrize("example", ["paper.yaml", "pets2009/site.yaml"])

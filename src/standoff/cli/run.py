@@ -81,6 +81,7 @@ def _ground_overrides(ground: str | None, box: str | None, camera: Path | None) 
     if ground not in (None, "auto"):
         # What the command line names is the ground; the file's markers may lie in another frame.
         overrides.setdefault("markers", [])
+        overrides["more_references"] = []
     if box is not None:
         overrides.setdefault("reference", {})
         if overrides["reference"] is None:

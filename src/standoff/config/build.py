@@ -15,10 +15,10 @@ from standoff.pipeline import Pipeline
 from standoff.stages.detect import OnnxDetector, RecordedDetector, find_model
 from standoff.stages.ground import (
     FusedGround,
+    FusedParams,
     GivenPlace,
     MarkerObserver,
-    ObservedGround,
-    ObservedParams,
+    Reference,
     ReferenceGround,
     ScaleWatch,
     Unmapped,
@@ -115,37 +115,46 @@ def build_ground(settings: Settings, known: CameraPrior | None = None) -> Ground
     """
     camera = _configured_camera(settings)
     prior = known if camera is None else CameraPrior.calibrated(camera)
-    if settings.ground.survey is None and settings.ground.reference is None:
-        auto = settings.ground.auto
-        if not (auto or settings.ground.markers):
-            return Unmapped()
-        params = ObservedParams(telemetry=auto, sizes=auto)
-        return ScaleWatch(ObservedGround(build_marker_observer(settings), camera=prior, params=params), prior)
-    if settings.ground.markers:
-        # Silence about a marker that nobody reads would pass for a site without one.
-        raise ConfigError(
-            expected="markers, or a reference object or a survey",
-            found="ground.markers beside another ground, which does not read them",
-            fix="take the markers out, or the reference or survey",
-        )
-    if settings.ground.survey is not None:
-        return ScaleWatch(load_survey(settings.ground.survey, camera=camera), prior)
-    return ScaleWatch(_reference_ground(settings.ground.reference, camera, prior), prior)
-
-
-def _reference_ground(reference: ReferenceSettings | None, camera: Camera | None, prior: CameraPrior | None) -> Ground:
-    assert reference is not None, "the only one that is left"
-    place = GivenPlace(reference.box_px, reference.box_time_s, reference.first_corner_px)
-    method = reference.params.method
-    if method not in ("fused", "refined"):
-        return ReferenceGround(reference.shape(), reference.params, place=place, camera=camera)
-    return FusedGround(
-        reference.shape(),
-        reference.params,
-        height_m=reference.height_m,
-        place=place,
+    ground = settings.ground
+    if ground.survey is not None:
+        if ground.markers:
+            raise _unread("ground.markers", "a survey")
+        return ScaleWatch(load_survey(ground.survey, camera=camera), prior)
+    given = ground.references
+    if given and given[0].params.method not in ("fused", "refined"):
+        if len(given) > 1 or ground.markers:
+            raise _unread("more references or ground.markers", f"the method {given[0].params.method}")
+        one = _reference(given[0], first=True)
+        return ScaleWatch(ReferenceGround(one.shape, one.params, place=one.place, camera=camera), prior)
+    if not (given or ground.auto or ground.markers):
+        return Unmapped()
+    fused = FusedGround(
+        [_reference(one, first=k == 0) for k, one in enumerate(given)],
+        build_marker_observer(settings),
         camera=prior,
-        remember=method == "fused",
+        # Beside something of known size, people's sizes watch over the scale; alone they would be a guess beside it.
+        params=FusedParams(telemetry=ground.auto, sizes=ground.auto and not given),
+        remember=not given or given[0].params.method == "fused",
+    )
+    return ScaleWatch(fused, prior)
+
+
+def _unread(what: str, beside: str) -> ConfigError:
+    # Silence about a marker that nobody reads would pass for a site without one.
+    return ConfigError(
+        expected="only what the ground stage reads",
+        found=f"{what} beside {beside}, which does not read them",
+        fix="take one of the two out",
+    )
+
+
+def _reference(settings: ReferenceSettings, *, first: bool) -> Reference:
+    return Reference(
+        settings.shape(),
+        settings.height_m,
+        GivenPlace(settings.box_px, settings.box_time_s, settings.first_corner_px),
+        settings.params,
+        place_known=first or settings.corners_m is not None,
     )
 
 
@@ -192,8 +201,7 @@ def _check_visible(settings: Settings, detector: Detector) -> None:
                     found=f"one without any {side} (its labels give {', '.join(sorted(visible))})",
                     fix="choose another model, map its labels with detect.class_map, or change proximity.pairs",
                 )
-    reference = settings.ground.reference
-    if reference is not None and reference.box_px is None and "reference" not in visible:
+    if any(one.box_px is None for one in settings.ground.references) and "reference" not in visible:
         raise ConfigError(
             expected="to know where the reference object is",
             found="neither a box nor a model with a class `reference`",

@@ -110,6 +110,13 @@ class GroundSettings(_Section):
             "where it is (box_px, box_time_s, first_corner_px), and params (method, thresholds)."
         ),
     ] = None
+    more_references: Annotated[
+        tuple[ReferenceSettings, ...],
+        Field(
+            description="Further reference objects. One with corners_m lies there in the site frame; another stands "
+            "wherever it is seen."
+        ),
+    ] = ()
     markers: Annotated[
         tuple[MarkerSettings, ...],
         Field(
@@ -123,8 +130,17 @@ class GroundSettings(_Section):
     def _one_source(self) -> GroundSettings:
         if self.survey is not None and self.reference is not None:
             raise ValueError("give either survey or reference, not both")
+        if self.more_references and self.reference is None:
+            raise ValueError("more_references need a reference, which says where the site frame is")
+        if len({one.params.method for one in self.references}) > 1:
+            raise ValueError("all references are looked for by one method")
         check_markers(self.markers, "survey" if self.survey else "reference" if self.reference else None)
         return self
+
+    @property
+    def references(self) -> tuple[ReferenceSettings, ...]:
+        """All reference objects; the first says where the site frame is."""
+        return () if self.reference is None else (self.reference, *self.more_references)
 
 
 class Replacement(_Section):

@@ -77,6 +77,23 @@ class View:
         rolled_right = np.cos(roll) * right + np.sin(roll) * down
         return cls(camera, position_m, np.stack([rolled_right, np.cross(forward, rolled_right), forward]))
 
+    @property
+    def heading_rad(self) -> float:
+        """Where the picture's upper edge points on the ground, clockwise from the site's y axis."""
+        return float(np.arctan2(-self.site_to_camera[0, 1], self.site_to_camera[0, 0]))
+
+    @property
+    def pitch_rad(self) -> float:
+        """How far the camera looks down from the horizon."""
+        return float(np.arcsin(np.clip(-self.site_to_camera[2, 2], -1.0, 1.0)))
+
+    @property
+    def roll_rad(self) -> float:
+        """How far the picture's right side is down; 0 straight down, where every turn is one of heading."""
+        right, down, _ = self.site_to_camera
+        level = max(float(np.hypot(right[2], down[2])), 1e-9)
+        return float(np.arcsin(np.clip(-right[2] / level, -1.0, 1.0)) * np.cos(self.pitch_rad))
+
     def project(self, points_m: FloatArray) -> FloatArray:
         """Show where points of the site appear, lens distortion included.
 

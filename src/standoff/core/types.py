@@ -192,6 +192,8 @@ class GroundMap:
         anchors_px: (A, 2) the points, as seen in the picture, that fixed it, for drawing.
         camera: The lens whose distortion is removed from points first; None: points are used as they are.
         age_s: Seconds since it was last observed; 0 when observed in this frame.
+        site_frame: Counts the stream's site frames up: where something better begins to tell the ground, places may be
+            counted from elsewhere, and those of different frames cannot be compared.
     """
 
     image_to_ground: FloatArray
@@ -203,6 +205,7 @@ class GroundMap:
     anchors_px: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
     camera: Camera | None = None
     age_s: float = 0.0
+    site_frame: int = 0
 
     def __post_init__(self) -> None:
         covariance = np.zeros((10, 10))

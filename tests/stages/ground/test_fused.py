@@ -14,8 +14,7 @@ from standoff.core.errors import GroundError
 from standoff.core.homography import FloatArray
 from standoff.core.pose import View
 from standoff.core.types import CameraMotion, Detections, GroundMap, ImageArray, NoCameraMotion, NoGroundMap
-from standoff.stages.ground import ReferenceParams, ReferenceShape
-from standoff.stages.ground.fused import FusedGround
+from standoff.stages.ground import FusedGround, FusedParams, Reference, ReferenceParams, ReferenceShape
 from standoff.stages.ground.solid import SolidState
 from standoff.stages.ground.where import NOT_SEEN, NOT_YET, GivenPlace
 
@@ -36,14 +35,20 @@ def _flown(k: int, speed_mps: float = 0.6) -> SolidState:
     return SolidState(start.changed(change), HEIGHT_M)
 
 
-def _ground(shape: ReferenceShape = SHAPE, *, box: bool = True, k: int = 0, **options: object) -> FusedGround:
-    place = GivenPlace(box_around(SHAPE, _flown(k)) if box else None, first_corner_px=top_px(SHAPE, _flown(k))[0])
-    settings: dict[str, object] = {
-        "height_m": HEIGHT_M,
-        "place": place,
-        "camera": CameraPrior.calibrated(CAMERA),
-    }
-    return FusedGround(shape, ReferenceParams(size_sigma=0.0), **(settings | options))  # type: ignore[arg-type]
+def _ground(
+    shape: ReferenceShape = SHAPE,
+    *,
+    box: bool = True,
+    height_m: float | None = HEIGHT_M,
+    place: GivenPlace | None = None,
+    camera: CameraPrior | None = None,
+    remember: bool = True,
+) -> FusedGround:
+    if place is None:
+        place = GivenPlace(box_around(SHAPE, _flown(0)) if box else None, first_corner_px=top_px(SHAPE, _flown(0))[0])
+    reference = Reference(shape, height_m, place, ReferenceParams(size_sigma=0.0))
+    params, prior = FusedParams(sizes=False), camera or CameraPrior.calibrated(CAMERA)
+    return FusedGround([reference], camera=prior, params=params, remember=remember)
 
 
 def _motion(k: int, key: int = 0) -> CameraMotion | NoCameraMotion:

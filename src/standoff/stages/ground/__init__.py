@@ -9,13 +9,13 @@ from standoff.stages.ground.marker_observer import MarkerObserver
 from standoff.stages.ground.marker_place import MarkerPlace
 from standoff.stages.ground.markers import Markers, find_markers
 from standoff.stages.ground.observation import PointObservation
-from standoff.stages.ground.observed import ObservedGround
-from standoff.stages.ground.params import ObservedParams, ReferenceParams
+from standoff.stages.ground.params import FusedParams, ReferenceParams
 from standoff.stages.ground.point_fit import belief_from_points, fit_points
 from standoff.stages.ground.pose_map import map_from_view
 from standoff.stages.ground.reference import ReferenceGround
 from standoff.stages.ground.scale_watch import ScaleWatch
 from standoff.stages.ground.shape import ReferenceShape
+from standoff.stages.ground.solid_observer import Reference
 from standoff.stages.ground.survey_file import load_survey
 from standoff.stages.ground.surveyed import SurveyedGround
 from standoff.stages.ground.telemetry_pose import TelemetryPose, view_from_telemetry
@@ -27,14 +27,14 @@ __all__ = [
     "BoardView",
     "CalibrationResult",
     "FusedGround",
+    "FusedParams",
     "GivenPlace",
     "MarkerFamily",
     "MarkerObserver",
     "MarkerPlace",
     "Markers",
-    "ObservedGround",
-    "ObservedParams",
     "PointObservation",
+    "Reference",
     "ReferenceGround",
     "ReferenceParams",
     "ReferenceShape",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -53,14 +54,13 @@ def markers_basis(places: Sequence[MarkerPlace]) -> str:
     return f"a printed marker of {text} m" if len(places) == 1 else f"{len(places)} printed markers of {text} m"
 
 
-BETTER_REFERENCE = "a larger reference, its height above the ground, and a camera file make it better"
-
 BETTER: Mapping[str, str] = {
+    "reference": "a larger reference, its height above the ground, and a camera file make it better",
     "markers": "a camera file, and a second marker far from the first, make it better",
     "telemetry": "a printed marker or a reference object of known size makes it better",
     "sizes": "a printed marker, a reference object of known size or the drone's log makes it better",
 }
-"""By what a map was found."""
+"""By what the most maps were found."""
 
 
 def expectation(sigma: float) -> str:
@@ -70,3 +70,54 @@ def expectation(sigma: float) -> str:
     'expect 12 %'
     """
     return f"expect {max(100.0 * sigma, 1.0):.0f} %"
+
+
+class BasisTally:
+    """Counts by what the frames of one stream were mapped, and how well.
+
+    Args:
+        shapes: Of the references.
+        places: Of the markers.
+
+    Attributes:
+        most_people: That were measured by at once.
+        why_none: The last reason for which there was no map.
+    """
+
+    def __init__(self, shapes: Sequence[ReferenceShape], places: Sequence[MarkerPlace]) -> None:
+        self._shapes, self._places = shapes, places
+        self._maps: Counter[str] = Counter()
+        self._sigmas: dict[str, float] = defaultdict(float)
+        self.most_people = 0
+        self.why_none = ""
+
+    def count(self, source: str, sigma: float) -> None:
+        """Count a map, whose lengths have a relative standard error."""
+        self._maps[source] += 1
+        self._sigmas[source] += sigma
+
+    def text(self, camera: CameraPrior | None) -> str:
+        """Say what the metres of the frames so far rest on."""
+        if self._maps:
+            return "; ".join(f"{self._text(one, camera)}: {self._expected(one)}" for one, _ in self._maps.most_common())
+        if self.why_none:
+            return f"nothing: {self.why_none}"
+        stated = ["reference"] * bool(self._shapes) + ["markers"] * bool(self._places)
+        told = " and ".join(self._text(one, camera) for one in stated)
+        return f"{told}, not seen yet" if told else "not known before the first frame"
+
+    @property
+    def better(self) -> str:
+        """What would make them better."""
+        return BETTER[self._maps.most_common(1)[0][0]] if self._maps else HELP
+
+    def _text(self, source: str, camera: CameraPrior | None) -> str:
+        if source == "reference":
+            return f"{' and '.join(map(reference_basis, self._shapes))}, {lens_text(camera)}"
+        if source == "markers":
+            return f"{markers_basis(self._places)}, {lens_text(camera)}"
+        return "the drone's telemetry" if source == "telemetry" else f"the height of {self.most_people} people"
+
+    def _expected(self, source: str) -> str:
+        share = f" in {self._maps[source]} of {self._maps.total()} frames with a map" if len(self._maps) > 1 else ""
+        return expectation(self._sigmas[source] / self._maps[source]) + share

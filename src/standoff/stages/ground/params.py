@@ -89,14 +89,18 @@ class ReferenceParams:
 
 
 @dataclass(frozen=True, slots=True)
-class ObservedParams:
-    """What `ObservedGround` may measure by, and when a map is none."""
+class FusedParams:
+    """What the ground may be measured by beside references and markers, and when a map is none."""
 
-    telemetry: Annotated[bool, Doc("Whether the drone's telemetry may say where the camera is.")] = True
-    sizes: Annotated[bool, Doc("Whether known sizes of people may, where nothing better is there.")] = True
+    telemetry: Annotated[
+        bool, Doc("Whether the drone's telemetry counts: beside references and markers, and alone where there is none.")
+    ] = True
+    sizes: Annotated[bool, Doc("Whether known sizes of people alone may give a map.")] = True
     size_sigma: Annotated[
         float, Interval(ge=0, le=0.2), Doc("Standard error of a printed marker's stated size, as a share of it.")
     ] = 0.005
     max_scale_sigma: Annotated[
-        float, Interval(gt=0, le=1), Doc("A map whose lengths are less sure than this share is no map.")
+        float,
+        Interval(gt=0, le=1),
+        Doc("A map whose lengths are less sure than this share is no map; for references their own limit."),
     ] = 0.3

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from standoff.core.homography import FloatArray
-from standoff.core.pose import POSE
 from standoff.core.types import CameraMotion, NoCameraMotion
 from standoff.stages.ground.carry import carry, since
+from standoff.stages.ground.lasting import LastingErrors
 from standoff.stages.ground.solid import HEIGHT, STATE, SolidState
 from standoff.stages.ground.solid_fit import Belief
 
@@ -58,8 +58,12 @@ class Estimate:
         return Belief(self.state, _inverse(self.covariance))
 
 
+_Keyframe = tuple[Estimate | None, float, CameraMotion | NoCameraMotion]
+"""A belief, when it was held, and the motion of the picture until then."""
+
+
 class PoseFilter:
-    """One stream's belief. `predict` comes first in each frame, then at most one `correct`."""
+    """One stream's belief. `predict` comes first in each frame, then at most one `correct` by each observer."""
 
     def __init__(self) -> None:
         self._key: Estimate | None = None
@@ -69,9 +73,10 @@ class PoseFilter:
         self._by_key = np.eye(STATE)
         self._motion: CameraMotion | NoCameraMotion = NoCameraMotion("not yet")
         self._key_motion: CameraMotion | NoCameraMotion = self._motion
+        self._before_lost: _Keyframe | None = None
         self._lost: tuple[Estimate, float] | None = None
-        self._observed_s = -np.inf
-        self._lasting_trace = np.inf
+        self._observed_s: dict[str, float] = {}
+        self._lasting = LastingErrors()
         self._same_s, self._lasting_share = _SAME_S, LASTING_SHARE
         self._height_doubt_m2 = np.zeros((STATE, STATE))
 
@@ -83,7 +88,7 @@ class PoseFilter:
     @property
     def observed_s(self) -> float:
         """When an observation was last taken in; minus infinity before the first."""
-        return self._observed_s
+        return max(self._observed_s.values(), default=-np.inf)
 
     def start(
         self,
@@ -93,6 +98,7 @@ class PoseFilter:
         *,
         height_known: bool = True,
         lasting_share: float | None = None,
+        by: str = "",
     ) -> None:
         """Begin, or begin again, with a belief about this frame.
 
@@ -103,6 +109,7 @@ class PoseFilter:
             height_known: Whether the solid's height was measured by hand.
             lasting_share: Of the belief's covariance, what is there in every frame and never averages out; None: what
                 edges of a reference leave, more of it while the lens is unsure.
+            by: Whose observation it is.
         """
         self._motion = motion
         covariance = _inverse(belief.information)
@@ -120,8 +127,10 @@ class PoseFilter:
         lasting = self._lasting_share * covariance + self._height_doubt_m2
         self._lost = None
         self._now = Estimate(belief.state, covariance, lasting)
-        self._now_s = self._observed_s = time_s
-        self._lasting_trace = _spread_m2(lasting)
+        self._now_s = time_s
+        self._observed_s = {by: time_s}
+        self._by_key = np.eye(STATE)
+        self._lasting.begin(by, lasting)
         self._rekey()
 
     def predict(self, time_s: float, motion: CameraMotion | NoCameraMotion) -> bool:
@@ -137,9 +146,9 @@ class PoseFilter:
         carried = None if since_key is None else carry(self._key.state.view, since_key, self._now.state.view)
         self._motion = motion
         if carried is None:
+            # The keyframe's belief is kept: a later frame may be followed from there again.
             self._drift(time_s)
             self._now_s = time_s
-            self._rekey()
             return False
         self._lost = None
         self._by_key = carried.by_key
@@ -151,35 +160,38 @@ class PoseFilter:
         self._now_s = time_s
         return True
 
-    def correct(self, state: SolidState, information: FloatArray) -> None:
+    def correct(self, state: SolidState, information: FloatArray, by: str = "") -> None:
         """Take in an observation of this frame.
 
         Args:
             state: The most likely one given prediction and observation together, the observation at full weight.
             information: (9, 9) that the observation adds at full weight.
+            by: Whose it is: those of one observer that follow each other have much in common, those of others do not.
         """
         assert self._key is not None and self._now is not None, "predicted first"
-        fresh = min(max((self._now_s - self._observed_s) / self._same_s, 0.0), 1.0)
+        if self._lost is not None:
+            given_up = self._key, self._key_s, self._key_motion
+            self._rekey()
+            # The next frame may be followed from there again, and not from this one.
+            self._before_lost = given_up
+        assert self._key is not None and self._now is not None
+        since_s = self._now_s - self._observed_s.get(by, -np.inf)
+        fresh = min(max(since_s / self._same_s, 0.0), 1.0)
         before = _inverse(self._now.covariance)
         pull = (before + information) @ state.change_from(self._now.state)
         covariance = _inverse(before + fresh * information)
         change = fresh * (covariance @ pull)
         gain = self._key.covariance @ self._by_key.T @ before
         key_covariance = self._key.covariance + gain @ (covariance - self._now.covariance) @ gain.T
-        lasting = self._lasting(before, information)
-        self._key = Estimate(
-            self._key.state.changed(gain @ change),
-            (key_covariance + key_covariance.T) / 2.0,
-            self._key.lasting if lasting is None else _carried_back(lasting, self._by_key),
-        )
-        self._now = Estimate(
-            self._now.state.changed(change), covariance, self._now.lasting if lasting is None else lasting
-        )
-        self._observed_s = self._now_s
+        self._offer_lasting(before, information, by)
+        lasting = self._lasting.total()
+        self._key = Estimate(self._key.state.changed(gain @ change), (key_covariance + key_covariance.T) / 2.0, lasting)
+        self._now = Estimate(self._now.state.changed(change), covariance, self._by_key @ lasting @ self._by_key.T)
+        self._observed_s[by] = self._now_s
         self._lost = None
 
-    def _lasting(self, before: FloatArray, information: FloatArray) -> FloatArray | None:
-        """Return the lasting covariance that goes with the best observation so far, or None if it is an earlier one.
+    def _offer_lasting(self, before: FloatArray, information: FloatArray, by: str) -> None:
+        """Note what of an observation's error is in all others of its kind.
 
         What was known of the lens before the first picture belongs to an observation by itself.
         """
@@ -189,13 +201,10 @@ class PoseFilter:
         )
         try:
             lasting = self._lasting_share * np.linalg.inv(alone + 1e-6 * before) + self._height_doubt_m2
+            back = _inverse(self._by_key)
         except np.linalg.LinAlgError:
-            return None
-        trace = _spread_m2(lasting)
-        if not trace < self._lasting_trace:
-            return None
-        self._lasting_trace = trace
-        return lasting
+            return
+        self._lasting.offer(by, back @ lasting @ back.T)
 
     def _since_key(self, motion: CameraMotion | NoCameraMotion) -> CameraMotion | None:
         """Return the motion since the frame at which the belief is held, which need not be the motion's keyframe."""
@@ -203,15 +212,28 @@ class PoseFilter:
             return None
         if _same_time(motion.keyframe_s, self._now_s) and not _same_time(self._key_s, self._now_s):
             self._rekey()
-        if _same_time(motion.keyframe_s, self._key_s):
+        since_key = self._since(self._key_s, self._key_motion, motion)
+        if since_key is None and self._before_lost is not None:
+            key, key_s, key_motion = self._before_lost
+            since_key = self._since(key_s, key_motion, motion)
+            if since_key is not None:
+                self._key, self._key_s, self._key_motion = key, key_s, key_motion
+        return since_key
+
+    @staticmethod
+    def _since(key_s: float, key_motion: CameraMotion | NoCameraMotion, motion: CameraMotion) -> CameraMotion | None:
+        """Return the motion since one frame, by what is known of how the picture moved until then and until now."""
+        if _same_time(motion.keyframe_s, key_s):
             return motion
-        if isinstance(self._key_motion, CameraMotion) and _same_time(motion.keyframe_s, self._key_motion.keyframe_s):
-            return since(self._key_motion, motion)
+        if isinstance(key_motion, CameraMotion) and _same_time(motion.keyframe_s, key_motion.keyframe_s):
+            return since(key_motion, motion)
         return None
 
     def _rekey(self) -> None:
         self._key, self._key_s, self._key_motion = self._now, self._now_s, self._motion
+        self._lasting.carry(self._by_key)
         self._by_key = np.eye(STATE)
+        self._before_lost = None
 
     def _drift(self, time_s: float) -> None:
         """Let the belief widen, from when the picture was lost on, as fast as a drone may move."""
@@ -223,19 +245,9 @@ class PoseFilter:
         self._now = Estimate(estimate.state, estimate.covariance + np.diag(sigma**2), estimate.lasting)
 
 
-def _carried_back(covariance: FloatArray, by_key: FloatArray) -> FloatArray:
-    """Return a covariance of the state now as one of the state at the keyframe."""
-    back = _inverse(by_key)
-    return back @ covariance @ back.T
-
-
 def _inverse(matrix: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.inv(matrix), dtype=np.float64)
 
 
 def _same_time(first_s: float, second_s: float) -> bool:
     return abs(first_s - second_s) <= _TIME_SLACK_S
-
-
-def _spread_m2(covariance: FloatArray) -> float:
-    return float(np.trace(covariance[POSE, POSE][3:, 3:]))

@@ -19,6 +19,7 @@ def map_from_view(
     age_s: float = 0.0,
     size_sigma: float = 0.0,
     middle_m: FloatArray | None = None,
+    site_frame: int = 0,
 ) -> GroundMap:
     """Return the map of the ground, z = 0.
 
@@ -31,6 +32,7 @@ def map_from_view(
         age_s: Since the view was last observed.
         size_sigma: Standard error of all lengths at once, as a share of them: of the tape measure.
         middle_m: (2,) the place that such an error leaves where it is; None: the origin.
+        site_frame: Which of the stream's site frames the metres are of.
     """
     matrix, by_view = _entries_with_jacobian(view)
     total = by_view @ covariance @ by_view.T
@@ -49,6 +51,7 @@ def map_from_view(
         anchors_px=anchors_px,
         camera=view.camera,
         age_s=age_s,
+        site_frame=site_frame,
     )
 
 

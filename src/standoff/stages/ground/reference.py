@@ -12,7 +12,7 @@ from standoff.core.camera import Camera
 from standoff.core.errors import GroundError
 from standoff.core.homography import FloatArray
 from standoff.core.types import CameraMotion, Detections, Frame, GroundMap, ImageArray, NoCameraMotion, NoGroundMap
-from standoff.stages.ground.basis import BETTER_REFERENCE, reference_basis
+from standoff.stages.ground.basis import BETTER, reference_basis
 from standoff.stages.ground.correspondence import camera_misfit_px, turn_from_before
 from standoff.stages.ground.follow import BoxFollower, moved_box
 from standoff.stages.ground.outline import OutlineFinder
@@ -77,7 +77,7 @@ class ReferenceGround:
         return {
             "kind": "reference",
             "basis": reference_basis(self._shape),
-            "better": BETTER_REFERENCE,
+            "better": BETTER["reference"],
             "corners_m": self._shape.corners_m.tolist(),
             "params": asdict(self._params),
             **self._given.describe(),

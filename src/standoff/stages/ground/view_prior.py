@@ -69,16 +69,12 @@ def telemetry_view(
 
 def in_frame_of(view: View, other: View) -> View:
     """Return a view turned about the vertical and shifted over the ground to where another one is."""
-    turn = _heading(other) - _heading(view)
+    turn = other.heading_rad - view.heading_rad
     cos, sin = np.cos(turn), np.sin(turn)
     # Headings turn clockwise, seen from above.
     rotation = view.site_to_camera @ np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
     left, _, right = np.linalg.svd(rotation)
     return View(view.camera, np.append(other.position_m[:2], view.position_m[2]), left @ right)
-
-
-def _heading(view: View) -> float:
-    return float(np.arctan2(-view.site_to_camera[0, 1], view.site_to_camera[0, 0]))
 
 
 def carried_prior(view: View, information: FloatArray) -> PriorRows:

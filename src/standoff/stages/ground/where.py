@@ -83,16 +83,28 @@ class GivenPlace:
         return self.box_xyxy_px
 
 
-def detected_box(detections: Detections, min_score: float, near_box_px: FloatArray | None = None) -> FloatArray | None:
-    """Return the surest detection of a reference; of those near an earlier box, where one is given.
+def detected_box(
+    detections: Detections,
+    min_score: float,
+    near_box_px: FloatArray | None = None,
+    taken: Sequence[FloatArray] = (),
+) -> FloatArray | None:
+    """Return the surest detection of a reference.
 
-    There may be two references in a picture.
+    Args:
+        detections: Of a frame.
+        min_score: Those less sure do not count.
+        near_box_px: (4,) an earlier box; only those near it count. None: all do.
+        taken: (4,) each: boxes of other references, whose detections do not count.
     """
     seen = np.isin(detections.class_id, class_ids(Role.REFERENCE)) & (detections.score >= min_score)
     if near_box_px is not None:
         centre, diagonal = _centre_and_diagonal(near_box_px)
         centres = (detections.xyxy_px[:, :2] + detections.xyxy_px[:, 2:]) / 2.0
         seen &= np.linalg.norm(centres - centre, axis=1) <= diagonal
+    for other in taken:
+        middle = (other[:2] + other[2:]) / 2.0
+        seen &= ~((detections.xyxy_px[:, :2] <= middle) & (middle <= detections.xyxy_px[:, 2:])).all(axis=1)
     if not seen.any():
         return None
     box: FloatArray = detections.xyxy_px[int(np.where(seen, detections.score, -1.0).argmax())]

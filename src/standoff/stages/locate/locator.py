@@ -36,6 +36,7 @@ class Locator:
         self._velocities = VelocityEstimator(self._params.velocity_window_s, self._params.velocity_min_span_s)
         self._observed_s: dict[int, float] = {}
         self._factored: tuple[GroundMap, FloatArray] | None = None
+        self._site_frame = 0
         self._class_radius_m = np.array([self._params.radius_m.get(c.name, c.action_radius_m) for c in CLASSES])
 
     def update(self, time_s: float, tracks: Tracks, ground: GroundMap | NoGroundMap) -> GroundPositions:
@@ -50,7 +51,7 @@ class Locator:
             Row i belongs to track i. A row is invalid, with its reason, when there is no map, when the
             box may go on outside the picture so that its anchor was not seen, and when the anchor is
             outside the lens model, at or beyond the horizon, or outside the map's polygon. Velocity
-            comes from observed positions only, not from coasting ones, and is NaN where invalid.
+            comes from observed positions of one site frame only, not from coasting ones, and is NaN where invalid.
         """
         coasted_s = self._coasted_s(time_s, tracks)
         if isinstance(ground, NoGroundMap):
@@ -59,6 +60,10 @@ class Locator:
             covariance_m2, map_factor_m = np.full((len(tracks), 2, 2), np.nan), np.full((len(tracks), 2, 10), np.nan)
             reason = np.full(len(tracks), f"no ground map: {ground.reason}", dtype=object)
         else:
+            if ground.site_frame != self._site_frame:
+                # Places of two site frames make no motion.
+                self._velocities.reset()
+                self._site_frame = ground.site_frame
             points_px = ground.undistorted(self._anchors(tracks))
             variance_px2 = self._anchor_variance(tracks, coasted_s)
             root = self._root(ground)

@@ -15,9 +15,9 @@ from standoff.core.pose import View
 from standoff.core.telemetry import Telemetry
 from standoff.core.types import CameraMotion, Detections, Frame, GroundMap, ImageArray, NoCameraMotion, NoGroundMap
 from standoff.evaluation.drawn_markers import Hardship, draw_marker, through_camera
-from standoff.stages.ground import MarkerObserver, MarkerPlace, ObservedGround, ObservedParams, marker_pattern
+from standoff.stages.ground import FusedGround, FusedParams, MarkerObserver, MarkerPlace, marker_pattern
 from standoff.stages.ground.marker_fit import agrees
-from standoff.stages.ground.observed import NO_MARKER
+from standoff.stages.ground.marker_landmarks import NO_MARKER
 from standoff.stages.ground.sizes_view import CONTRADICTION, FEW_PEOPLE
 
 CAMERA = Camera(640, 480, np.array([[600.0, 0.0, 319.5], [0.0, 600.0, 239.5], [0.0, 0.0, 1.0]]), np.zeros(5))
@@ -51,9 +51,9 @@ def unmoved(keyframe_s: float = 0.0) -> CameraMotion:
     return CameraMotion(np.eye(3), 1e-12 * np.eye(9), keyframe_s)
 
 
-def by_marker(*places: MarkerPlace, camera: CameraPrior | None = None) -> ObservedGround:
+def by_marker(*places: MarkerPlace, camera: CameraPrior | None = None) -> FusedGround:
     prior = CameraPrior.calibrated(CAMERA) if camera is None else camera
-    return ObservedGround(MarkerObserver(places or (PLACE,)), camera=prior)
+    return FusedGround((), MarkerObserver(places or (PLACE,)), camera=prior)
 
 
 def mapped(result: GroundMap | NoGroundMap) -> GroundMap:
@@ -116,19 +116,19 @@ def test_telemetry_alone_gives_metres_within_its_stated_errors() -> None:
         view = looking(20.0, 40.0 + seed % 30, 25.0)
         said = telemetry_of(view, np.random.default_rng(seed))
         result = mapped(
-            ObservedGround(camera=CameraPrior.calibrated(CAMERA)).update(frame(BARE, 0.0, said), NOTHING, STILL)
+            FusedGround(camera=CameraPrior.calibrated(CAMERA)).update(frame(BARE, 0.0, said), NOTHING, STILL)
         )
         off.append(np.median(error_in_sigmas(result, view)))
     assert np.mean(np.array(off) < 2.0) > 0.9
 
 
 def test_more_telemetry_does_not_make_lengths_surer() -> None:
-    ground, said = ObservedGround(camera=CameraPrior.calibrated(CAMERA)), telemetry_of(looking())
+    ground, said = FusedGround(camera=CameraPrior.calibrated(CAMERA)), telemetry_of(looking())
     sigmas = [length_after(ground, time_s, said) for time_s in np.arange(0.0, 5.0, 0.5)]
     assert (np.diff(sigmas) >= -1e-9).all()
 
 
-def length_after(ground: ObservedGround, time_s: float, said: Telemetry | None, gray: ImageArray = BARE) -> float:
+def length_after(ground: FusedGround, time_s: float, said: Telemetry | None, gray: ImageArray = BARE) -> float:
     """Return the relative standard error of lengths after one frame more of a camera that stands still."""
     result = mapped(ground.update(frame(gray, time_s, said), NOTHING, unmoved()))
     pixels = np.array([[300.0, 300.0], [340.0, 300.0]])
@@ -206,7 +206,7 @@ def test_people_alone_give_a_map_or_a_reason_never_silence() -> None:
     gray = np.zeros((720, 1280), dtype=np.uint8)
     mapped_ones = 0
     for seed in range(6):
-        crowd, ground = random_crowd(seed), ObservedGround()
+        crowd, ground = random_crowd(seed), FusedGround()
         results = [ground.update(frame(gray, time_s), people(boxes), unmoved()) for time_s, boxes in crowd.pictures]
         assert all(result or reason(result) for result in results)
         if isinstance(results[-1], GroundMap):
@@ -227,7 +227,7 @@ def test_a_few_people_need_the_drone_s_height_beside_them() -> None:
     wrong = replace(said, height_m=10.0 * said.height_m)
     last: dict[str, GroundMap | NoGroundMap] = {}
     for name, telemetry in (("alone", None), ("height", said), ("wrong", wrong)):
-        ground = ObservedGround(camera=CameraPrior.calibrated(drone_camera()))
+        ground = FusedGround(camera=CameraPrior.calibrated(drone_camera()))
         for time_s, boxes in crowd.pictures:
             last[name] = ground.update(frame(gray, time_s, telemetry), people(boxes), unmoved())
     assert FEW_PEOPLE in reason(last["alone"])
@@ -237,16 +237,19 @@ def test_a_few_people_need_the_drone_s_height_beside_them() -> None:
 
 def test_what_the_metres_rest_on_is_said_once_it_is_known() -> None:
     ground = by_marker()
-    assert "first frame" in ground.basis
+    assert ground.description["basis"].endswith("not seen yet")
+    assert "first frame" in FusedGround().description["basis"]
     ground.update(frame(pictured(looking())), NOTHING, unmoved())
-    assert ground.basis.startswith("a printed marker of 1.2 m, its camera's lens from a camera file: expect")
-    nothing = ObservedGround(params=ObservedParams(telemetry=False, sizes=False))
+    assert ground.description["basis"].startswith(
+        "a printed marker of 1.2 m, its camera's lens from a camera file: expect"
+    )
+    nothing = FusedGround(params=FusedParams(telemetry=False, sizes=False))
     assert "would help" in reason(nothing.update(frame(BARE), NOTHING, STILL))
-    assert nothing.basis.startswith("nothing")
+    assert nothing.description["basis"].startswith("nothing")
 
 
 @pytest.mark.parametrize("missing", ["pitch_deg", "height_m"])
 def test_telemetry_that_lacks_something_is_no_map_and_says_what(missing: str) -> None:
     said = telemetry_of(looking(), None, **{missing: np.nan})
-    result = ObservedGround(camera=CameraPrior.calibrated(CAMERA)).update(frame(BARE, 0.0, said), NOTHING, STILL)
+    result = FusedGround(camera=CameraPrior.calibrated(CAMERA)).update(frame(BARE, 0.0, said), NOTHING, STILL)
     assert "telemetry without" in reason(result)

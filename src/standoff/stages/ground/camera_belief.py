@@ -1,0 +1,170 @@
+"""What one stream believes of its camera: where it is, by what that is known, and in which site frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from standoff.core.camera import CameraPrior
+from standoff.core.homography import FloatArray
+from standoff.core.pose import CHANGES, LENS, View
+from standoff.core.types import CameraMotion, Detections, Frame, ImageArray, NoCameraMotion
+from standoff.stages.ground.pose_filter import LASTING_SHARE, Estimate, PoseFilter
+from standoff.stages.ground.pose_map import length_sigma
+from standoff.stages.ground.solid import SolidState
+from standoff.stages.ground.solid_fit import Belief
+from standoff.stages.ground.view_prior import belief_of, in_frame_of
+
+Source = Literal["reference", "markers", "telemetry", "sizes"]
+LANDMARKS: tuple[Source, ...] = ("reference", "markers")
+STATED = "stated"
+"""The site frame that references and markers of stated places share."""
+
+
+@dataclass(eq=False)
+class Moment:
+    """One frame, and what has been learned about it so far.
+
+    Attributes:
+        frame: The frame.
+        detections: Of it.
+        motion: Of the picture since the keyframe.
+        held: Whether motion, or something seen in this frame, tells where the camera is now.
+        anchors_px: (N, 2) each: what was seen to measure by.
+    """
+
+    frame: Frame
+    detections: Detections
+    motion: CameraMotion | NoCameraMotion
+    held: bool = False
+    anchors_px: list[FloatArray] = field(default_factory=list)
+
+    @cached_property
+    def gray(self) -> ImageArray:
+        """(H, W) the picture."""
+        return self.frame.picture.gray()
+
+    @property
+    def text(self) -> str:
+        """When it is, for people."""
+        return f"frame {self.frame.index} ({self.frame.time_s:.2f} s)"
+
+
+class CameraBelief:
+    """The belief about one camera.
+
+    Args:
+        prior: What is known of the lens, for pictures of this size.
+
+    Attributes:
+        source: What it rests on; None: there is none.
+        keeper: Name of the reference whose height is the belief's; "" where it has none.
+        site_frame: Counts the site frames up; positions in different ones cannot be compared.
+        warnings: What contradicted it, each said once.
+    """
+
+    def __init__(self, prior: CameraPrior) -> None:
+        self._prior = prior
+        self.site_frame = -1
+        self.warnings: dict[str, str] = {}
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget where the camera is."""
+        self._filter = PoseFilter()
+        self.source: Source | None = None
+        self.keeper = ""
+        self.frame_of = ""
+        self.begun_sigma = np.inf
+
+    @property
+    def now(self) -> Estimate | None:
+        """What is believed in the frame that was predicted last; None before the start."""
+        return self._filter.now
+
+    @property
+    def observed_s(self) -> float:
+        """When an observation was last taken in; minus infinity before the first."""
+        return self._filter.observed_s
+
+    @property
+    def by_landmark(self) -> bool:
+        """Whether it rests on references or markers."""
+        return self.source in LANDMARKS
+
+    @property
+    def length_sigma(self) -> float:
+        """Relative standard error of lengths in the middle of the picture now; infinite before the start."""
+        now = self.now
+        return np.inf if now is None else length_sigma(now.state.view, now.total[:CHANGES, :CHANGES])
+
+    @property
+    def lens(self) -> CameraPrior:
+        """What is known of the lens, by references and markers too."""
+        now = self.now
+        if now is None or not self.by_landmark:
+            return self._prior
+        focal_sigma, k1_sigma = np.sqrt(np.diag(now.total))[LENS]
+        return CameraPrior(now.state.view.camera, float(focal_sigma), float(k1_sigma), self._prior.origin)
+
+    def predict(self, moment: Moment) -> None:
+        """Carry the belief to a frame by motion; the moment is then held."""
+        moment.held = self._filter.predict(moment.frame.time_s, moment.motion)
+
+    def correct(self, state: SolidState, information: FloatArray, by: str, moment: Moment) -> None:
+        """Take in an observation, as `PoseFilter.correct`; the moment is then held."""
+        self._filter.correct(state, information, by)
+        moment.held = True
+
+    def begin(
+        self,
+        source: Source,
+        belief: Belief,
+        moment: Moment,
+        *,
+        frame_of: str,
+        keeper: str = "",
+        height_known: bool = True,
+    ) -> None:
+        """Begin, or begin again; the moment is then held.
+
+        Args:
+            source: What the belief rests on.
+            belief: About the camera, in the site frame.
+            moment: The frame.
+            frame_of: Whose the site frame is.
+            keeper: Name of the reference whose height is the belief's.
+            height_known: Whether that was measured by hand.
+        """
+        lasting_share = None if keeper else LASTING_SHARE
+        by = keeper or source
+        self._filter.start(
+            belief,
+            moment.frame.time_s,
+            moment.motion,
+            height_known=height_known,
+            lasting_share=lasting_share,
+            by=by,
+        )
+        if frame_of != self.frame_of:
+            self.site_frame += 1
+        self.source, self.keeper, self.frame_of = source, keeper, frame_of
+        moment.held = True
+        self.begun_sigma = self.length_sigma
+
+    def begin_in_old_frame(self, source: Source, view: View, covariance: FloatArray, moment: Moment) -> None:
+        """Begin with a view in whose frame nothing is marked on the ground: the frame so far goes on, if there is one.
+
+        Args:
+            source: What it rests on.
+            view: The camera.
+            covariance: (8, 8) of a change of it.
+            moment: The frame.
+        """
+        frame_of = self.frame_of or source
+        if self.now is not None and source != self.frame_of:
+            view = in_frame_of(view, self.now.state.view)
+        self.begin(source, belief_of(view, covariance), moment, frame_of=frame_of)

@@ -1,0 +1,165 @@
+"""Reference objects as landmarks: they begin the belief about the camera, correct it, or show that they were moved."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from standoff.core.homography import FloatArray
+from standoff.core.types import NoGroundMap
+from standoff.stages.ground.beside import with_telemetry
+from standoff.stages.ground.camera_belief import STATED, CameraBelief, Moment
+from standoff.stages.ground.placement import Placement
+from standoff.stages.ground.pose_filter import Estimate
+from standoff.stages.ground.solid import SolidState
+from standoff.stages.ground.solid_fit import Belief
+from standoff.stages.ground.solid_observer import Reference, SolidObserver
+from standoff.stages.ground.which_box import sort_out
+
+OTHERWISE = "a reference does not look as it must from where the camera is"
+
+_MOVED_M, _MOVED_SIGMAS = 0.15, 4.0
+"""A reference that is seen so far from where it stood has been moved."""
+
+_MOST_CHI2 = 35.0
+"""Height, angles and lens by two things exceed it once in ten thousand times, edges being pulled here and there."""
+
+
+class ReferenceLandmarks:
+    """The reference objects of one stream.
+
+    Args:
+        references: The most important one first.
+        telemetry: Whether the drone's telemetry counts beside them.
+        remember: Whether frames know of those before them.
+    """
+
+    def __init__(self, references: Sequence[Reference], *, telemetry: bool, remember: bool) -> None:
+        self._solids = [
+            SolidObserver(one, _name(k, len(references)), remember=remember) for k, one in enumerate(references)
+        ]
+        self._telemetry = telemetry
+
+    def reset(self) -> None:
+        """Forget everything that the pictures have told."""
+        for solid in self._solids:
+            solid.reset()
+
+    def keeper(self, belief: CameraBelief) -> SolidObserver | None:
+        """Return the reference whose height is the belief's, if there is one."""
+        return next((solid for solid in self._solids if solid.name == belief.keeper), None)
+
+    def look(self, moment: Moment, belief: CameraBelief) -> list[str]:
+        """Take in the references in the picture.
+
+        Args:
+            moment: The frame.
+            belief: About the camera; begun or corrected here.
+
+        Returns:
+            Why those that were not taken in were not.
+        """
+        now = belief.now if moment.held else None
+        if now is not None:
+            for solid in self._solids:
+                solid.carry(now, keeps_height=_keeps_height(solid, belief))
+        lost = [solid for solid in self._solids if not solid.located]
+        if len(lost) > 1 and not (belief.by_landmark and moment.held):
+            reason = sort_out(lost, moment.gray, moment.detections, belief.lens)
+            if reason:
+                return [reason]
+        return [reason for solid in self._solids if (reason := self._look_at(solid, moment, belief))]
+
+    def _look_at(self, solid: SolidObserver, moment: Moment, belief: CameraBelief) -> str:
+        now, time_s = belief.now, moment.frame.time_s
+        if now is not None and belief.by_landmark:
+            seen = solid.look(moment.gray, now, held=moment.held, keeps_height=_keeps_height(solid, belief))
+            if seen is not None:
+                _take(solid, seen, moment, belief)
+                return ""
+        taken = [other.box for other in self._solids if other is not solid and other.box is not None]
+        held = belief.by_landmark and moment.held
+        found = solid.search(moment.gray, time_s, moment.detections, belief.lens, held=held, taken=taken)
+        if isinstance(found, NoGroundMap):
+            return found.reason
+        own = solid.belief(found)
+        outranks = solid.reference.place_known and belief.frame_of not in ("", STATED)
+        if not held or outranks:
+            self._begin(solid, own, moment, belief)
+            return ""
+        reason = _join(solid, own, moment, belief)
+        alone = len(self._solids) == 1 and belief.source == "reference"
+        if reason and alone and solid.is_elsewhere(time_s, moment.detections):
+            # What was believed began with a mistake.
+            self._begin(solid, own, moment, belief)
+            return ""
+        return reason
+
+    def _begin(self, solid: SolidObserver, own: Belief, moment: Moment, belief: CameraBelief) -> None:
+        telemetry = moment.frame.telemetry
+        if self._telemetry and telemetry is not None:
+            own, contradiction = with_telemetry(own, telemetry)
+            if contradiction:
+                text = f"{contradiction} ({moment.text}): {solid.name} is trusted, because its size was measured"
+                belief.warnings.setdefault("telemetry", text)
+        frame_of = STATED if solid.reference.place_known else solid.name
+        known = solid.reference.height_m is not None
+        if frame_of != belief.frame_of:
+            for other in self._solids:
+                other.forget_place()
+        belief.begin("reference", own, moment, frame_of=frame_of, keeper=solid.name, height_known=known)
+        solid.defines_frame()
+        moment.anchors_px.append(solid.note(own.state))
+
+
+def _name(index: int, count: int) -> str:
+    return "the reference" if count == 1 else f"reference {index + 1}"
+
+
+def _keeps_height(solid: SolidObserver, belief: CameraBelief) -> bool:
+    """Return whether the belief's height is this reference's, and the reference still where it was."""
+    return solid.name == belief.keeper and solid.stands_still
+
+
+def _take(solid: SolidObserver, seen: tuple[SolidState, FloatArray], moment: Moment, belief: CameraBelief) -> None:
+    belief.correct(*seen, solid.name, moment)
+    now = belief.now
+    assert now is not None
+    moment.anchors_px.append(solid.note_seen(now, keeps_height=_keeps_height(solid, belief)))
+
+
+def _join(solid: SolidObserver, own: Belief, moment: Moment, belief: CameraBelief) -> str:
+    """Take in a reference that was found by a search while the camera's place is known; or say why not."""
+    now = belief.now
+    assert now is not None
+    placement = Placement.between(own.state.view, now.state.view, solid.reference.middle_m, own.state.height_m)
+    if not _agree(solid, placement, own, now):
+        return OTHERWISE
+    stood = solid.placement
+    moved_m = 0.0 if stood is None else placement.moved_by(stood, solid.reference.middle_m)
+    if stood is None or moved_m > max(_MOVED_M, _MOVED_SIGMAS * solid.place_sigma_m(now)):
+        if stood is not None:
+            belief.warnings.setdefault(f"{solid.name} moved", _moved(solid, moved_m, moment))
+        if solid.name == belief.keeper:
+            solid.remember_height(now)
+        solid.stands(placement)
+    keeps_height = _keeps_height(solid, belief)
+    seen = solid.look(moment.gray, now, held=True, keeps_height=keeps_height, found=own.state)
+    if seen is not None:
+        _take(solid, seen, moment, belief)
+    return ""
+
+
+def _agree(solid: SolidObserver, placement: Placement, own: Belief, now: Estimate) -> bool:
+    """Return whether a reference, wherever it stands, is seen as a camera of this height and these angles sees it."""
+    through = solid.through(now, placement, place_known=False)
+    spread = through.covariance + now.lasting + np.linalg.inv(own.information)
+    off = own.state.change_from(through.belief.state)
+    return bool(off @ np.linalg.solve(spread, off) <= _MOST_CHI2)
+
+
+def _moved(solid: SolidObserver, moved_m: float, moment: Moment) -> str:
+    if solid.was_seen:
+        return f"{solid.name} was moved by {moved_m:.1f} m before {moment.text}: the ground's picture tells places now"
+    return f"{solid.name} stands {moved_m:.1f} m from its stated place ({moment.text}): what was seen first is trusted"
