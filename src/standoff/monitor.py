@@ -16,7 +16,6 @@ from typing import Any
 from standoff.clips import DETECTIONS_FILE
 from standoff.config import Settings, build_pipeline, build_replacement, resolved
 from standoff.core.errors import OutputError
-from standoff.core.protocols import Ground
 from standoff.core.types import FrameResult, Sink
 from standoff.pipeline import Pipeline
 from standoff.stages.detect import RecordedDetector
@@ -92,12 +91,12 @@ def open_run(source: Path | str, out: Path | str, settings: Settings, *, overwri
         "settings": resolved(settings),
         "source": frames.description,
         "model": getattr(pipeline.detector, "description", None),
-        **_ground_parts(frames, pipeline.ground),
+        **_known_so_far(frames, pipeline),
     }
 
     def at_close() -> dict[str, Any]:
-        """Return what is known of the ground, now that the frames have been seen."""
-        return _ground_parts(frames, pipeline.ground)
+        """Return what is known of the ground and the film, now that the frames have been seen."""
+        return _known_so_far(frames, pipeline)
 
     extra = {name: build_replacement(name, replacement) for name, replacement in settings.extra_outputs.items()}
     folder = prepare_output(out, overwrite=overwrite)
@@ -107,16 +106,16 @@ def open_run(source: Path | str, out: Path | str, settings: Settings, *, overwri
     return Run(frames, pipeline, folder)
 
 
-def _ground_parts(source: Source, ground: Ground) -> dict[str, Any]:
+def _known_so_far(source: Source, pipeline: Pipeline) -> dict[str, Any]:
     return {
-        "ground": getattr(ground, "description", None),
-        "warnings": [*source.warnings, *ground_warnings(ground)],
+        "ground": getattr(pipeline.ground, "description", None),
+        "warnings": [*source.warnings, *stage_warnings(pipeline.motion, pipeline.ground)],
     }
 
 
-def ground_warnings(ground: Ground) -> list[str]:
-    """Return what a ground stage says of its own set-up, and of its metres once it has seen frames."""
-    return list(getattr(ground, "description", {}).get("warnings", ()))
+def stage_warnings(*stages: object) -> list[str]:
+    """Return what stages say of their own set-up, and of what they have seen so far."""
+    return [text for stage in stages for text in getattr(stage, "description", {}).get("warnings", ())]
 
 
 def _refuse_to_replace(source: Path, out: Path, what: str) -> None:

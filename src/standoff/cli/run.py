@@ -152,7 +152,7 @@ def run(
 ) -> None:
     """Monitor a video: distances in metres, hazards, an annotated film and a report."""
     from standoff.config import load_settings
-    from standoff.monitor import RECORD, ground_warnings, open_run
+    from standoff.monitor import RECORD, open_run, stage_warnings
 
     plain = {
         "telemetry": telemetry,
@@ -168,16 +168,17 @@ def run(
     if ground_overrides := _ground_overrides(ground, reference_box, camera):
         overrides["ground"] = ground_overrides
     opened = open_run(source, out, load_settings(config, overrides), overwrite=overwrite)
-    for warning in (*opened.source.warnings, *ground_warnings(opened.pipeline.ground)):
+    stages = opened.pipeline.motion, opened.pipeline.ground
+    known = stage_warnings(*stages)
+    for warning in (*opened.source.warnings, *known):
         typer.echo(f"standoff: warning: {warning}", err=True)
-    known = set(ground_warnings(opened.pipeline.ground))
     try:
         watch(opened, quiet=quiet)
     except StandoffError:
         # Its own line says it all; only a machine still wants the record.
         tell(out / RECORD, as_json=as_json, quiet=True)
         raise
-    for warning in ground_warnings(opened.pipeline.ground):
+    for warning in stage_warnings(*stages):
         if warning not in known:
             typer.echo(f"standoff: warning: {warning}", err=True)
     tell(out / RECORD, as_json=as_json, quiet=quiet)

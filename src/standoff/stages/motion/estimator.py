@@ -12,6 +12,7 @@ from standoff.core.camera import Camera
 from standoff.core.errors import GroundError
 from standoff.core.homography import FloatArray
 from standoff.core.types import CameraMotion, Detections, Frame, NoCameraMotion
+from standoff.stages.motion.breaks import Breaks
 from standoff.stages.motion.keyframe import Keyframe, Match
 from standoff.stages.motion.lens import Lens
 from standoff.stages.motion.movers import Movers
@@ -25,6 +26,7 @@ ZOOMED = "the camera zoomed"
 RESIZED = "the picture's size changed"
 TURNED_BACK = "the clock went backwards"
 TOO_LITTLE = "too little to follow"
+_NAMED = (CUT, ZOOMED, RESIZED, TURNED_BACK)
 
 _NEAR_LEVELS = 1
 _FAR_LEVELS = 4
@@ -56,10 +58,18 @@ class MotionEstimator:
     @property
     def description(self) -> dict[str, Any]:
         """Everything that a record of the run should say about this stage."""
-        return {"params": asdict(self._params), "lens_distortion_removed": self._given_camera is not None}
+        return {
+            "params": asdict(self._params),
+            "lens_distortion_removed": self._given_camera is not None,
+            "warnings": self._breaks.warnings,
+        }
 
     def reset(self) -> None:
         """Forget everything: a new stream follows."""
+        self._breaks = Breaks()
+        self._forget()
+
+    def _forget(self) -> None:
         self._lens = Lens(None, (0, 0))
         self._noise_px = np.nan
         self._before: FollowedPicture | None = None
@@ -90,16 +100,21 @@ class MotionEstimator:
         picture = FollowedPicture.of(frame, self._params.width_px)
         broken = self._broken_by(picture)
         if broken:
-            self.reset()
+            self._forget()
         if self._before is None:
             self._lens = Lens(self._camera_for(frame.size_px), frame.size_px)
         elif picture.repeats(self._before):
             self._shown_s = frame.time_s
+            self._breaks.note(frame, "", repeated=True)
             return replace(self._now, repeated=True) if isinstance(self._now, CameraMotion) else self._now
         movers_px = self._movers.look(frame.time_s, detections, self._step)
-        result = self._looked_at(picture, movers_px)
+        result = NoCameraMotion(broken) if broken else self._looked_at(picture, movers_px)
+        if broken:
+            self._begin(picture, movers_px)
         self._before, self._before_movers_px, self._shown_s = picture, movers_px, frame.time_s
-        return NoCameraMotion(broken) if broken else result
+        what = result.reason if isinstance(result, NoCameraMotion) and result.reason in _NAMED else ""
+        self._breaks.note(frame, what, repeated=False)
+        return result
 
     def _broken_by(self, picture: FollowedPicture) -> str:
         if self._before is None:
