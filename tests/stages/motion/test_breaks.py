@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from drawn_ground import SIZE_PX
-from flown_ground import NOTHING, OTHER_GROUND, flight, frame, seen
+from flown_ground import FPS, NOTHING, OTHER_GROUND, flight, frame, seen
 
 from standoff.core.homography import FloatArray
 from standoff.core.types import Frame, ImageArray
@@ -53,9 +53,11 @@ def test_a_zoom_is_told_once_however_many_frames_it_takes() -> None:
 
 def test_a_picture_that_stands_still_is_told_and_one_that_is_shown_twice_is_not() -> None:
     pictures = [seen(flight(0.02 * k), seed=k) for k in range(4)]
-    frozen = film([*pictures, *[pictures[-1]] * 20, *[seen(flight(0.02 * k), seed=k) for k in range(4, 8)]])
+    frozen = film(
+        [*pictures, *[pictures[-1]] * round(2.5 * FPS), *[seen(flight(0.02 * k), seed=k) for k in range(4, 8)]]
+    )
     (warning,) = told(frozen)
-    assert warning.startswith("the picture stood still in frames 3 to 23 (")
+    assert warning.startswith(f"the picture stood still in frames 3 to {3 + round(2.5 * FPS)} (")
     assert told(film([picture for picture in pictures for _ in range(2)])) == []
 
 

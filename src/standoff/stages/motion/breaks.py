@@ -12,8 +12,9 @@ from standoff.core.types import Frame
 FROZEN = "the picture stood still"
 JUMPED = "the clock jumped ahead"
 
-_LEAST_FROZEN_S = 0.5
-"""Films hold a picture for a frame or two; what stands still for so long is a fault of the link or the file."""
+_LEAST_FROZEN_S = 2.0
+"""Films hold a picture for a frame or two, and a fixed camera over a quiet site may for longer; beyond, it is a fault of
+the link or the file."""
 
 _LEAST_JUMP_S, _JUMP_STEPS, _MOST_STEPS = 1.0, 10.0, 50
 _TOGETHER_S = 1.0
