@@ -187,3 +187,19 @@ def test_one_bad_frame_of_motion_does_not_lose_a_hidden_reference_s_map() -> Non
     assert isinstance(ground.update(frame(bare, 2 / FPS), Detections.empty(), STILL), NoGroundMap)
     error, sigma = error_and_sigma(ground.update(frame(bare, 3 / FPS), Detections.empty(), motion(3)), 3)
     assert error < 3.0 * sigma
+
+
+@pytest.mark.parametrize("factor", [0.55, 0.8, 1.0, 1.03, 1.4])
+def test_a_lens_that_cannot_be_is_named_and_not_used(factor: float) -> None:
+    stated = CameraPrior.calibrated(CAMERA.refocused(factor, float(CAMERA.distortion[0])))
+    ground = following(references()[0], camera=stated)
+    result = ground.update(frame(picture(0, second=False), 0.0), boxes(0, second=False), STILL)
+    warnings = ground.description["warnings"]
+    if 0.9 < factor < 1.1:
+        assert not warnings
+    else:
+        (warning,) = warnings
+        named = float(warning.split("one ")[1].split(" times")[0])
+        assert named == pytest.approx(1.0 / factor, rel=0.1)
+        error, sigma = error_and_sigma(result, 0)
+        assert error < 3.0 * sigma

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
 
 import numpy as np
 
-from standoff.core.camera import CameraPrior
+from standoff.core.camera import Camera, CameraPrior
 from standoff.core.homography import FloatArray
 from standoff.core.pose import CHANGES, LENS, View
 from standoff.core.types import CameraMotion, Detections, Frame, ImageArray, NoCameraMotion
@@ -109,6 +109,10 @@ class CameraBelief:
             return self._prior
         focal_sigma, k1_sigma = np.sqrt(np.diag(now.total))[LENS]
         return CameraPrior(now.state.view.camera, float(focal_sigma), float(k1_sigma), self._prior.origin)
+
+    def doubt_lens(self, camera: Camera) -> None:
+        """Take the lens that something of known size was seen through for likely, whatever was stated."""
+        self._prior = replace(CameraPrior.unknown(camera.width_px, camera.height_px), camera=camera)
 
     def predict(self, moment: Moment) -> None:
         """Carry the belief to a frame by motion; the moment is then held."""

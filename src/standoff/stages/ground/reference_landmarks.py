@@ -10,14 +10,20 @@ from standoff.core.homography import FloatArray
 from standoff.core.types import NoGroundMap
 from standoff.stages.ground.beside import with_telemetry
 from standoff.stages.ground.camera_belief import STATED, CameraBelief, Moment
+from standoff.stages.ground.lens_check import found_with_another_lens, refitted_lens
 from standoff.stages.ground.placement import Placement
 from standoff.stages.ground.pose_filter import Estimate
+from standoff.stages.ground.quadrilateral import NO_QUADRILATERAL
 from standoff.stages.ground.solid import SolidState
 from standoff.stages.ground.solid_fit import Belief
 from standoff.stages.ground.solid_observer import Reference, SolidObserver
+from standoff.stages.ground.solid_search import NOT_THERE
 from standoff.stages.ground.which_box import sort_out
 
 OTHERWISE = "a reference does not look as it must from where the camera is"
+
+_MOST_LENS_DOUBTS = 2
+"""Each costs a search."""
 
 _MOVED_M, _MOVED_SIGMAS = 0.15, 4.0
 """A reference that is seen so far from where it stood has been moved."""
@@ -40,9 +46,11 @@ class ReferenceLandmarks:
             SolidObserver(one, _name(k, len(references)), remember=remember) for k, one in enumerate(references)
         ]
         self._telemetry = telemetry
+        self._lens_doubts = 0
 
     def reset(self) -> None:
         """Forget everything that the pictures have told."""
+        self._lens_doubts = 0
         for solid in self._solids:
             solid.reset()
 
@@ -82,6 +90,8 @@ class ReferenceLandmarks:
         held = belief.by_landmark and moment.held
         found = solid.search(moment.gray, time_s, moment.detections, belief.lens, held=held, taken=taken)
         if isinstance(found, NoGroundMap):
+            if found.reason in (NOT_THERE, NO_QUADRILATERAL):
+                self._doubt_lens(moment, belief, solid)
             return found.reason
         own = solid.belief(found)
         outranks = solid.reference.place_known and belief.frame_of not in ("", STATED)
@@ -96,7 +106,21 @@ class ReferenceLandmarks:
             return ""
         return reason
 
+    def _doubt_lens(self, moment: Moment, belief: CameraBelief, solid: SolidObserver) -> None:
+        """See whether another lens would explain a reference that is not found, a few times at most."""
+        box = solid.box_now(moment.frame.time_s, moment.detections, ())
+        if isinstance(box, NoGroundMap) or belief.by_landmark or self._lens_doubts >= _MOST_LENS_DOUBTS:
+            return
+        self._lens_doubts += 1
+        text = found_with_another_lens(moment.gray, box, solid.reference.shape, belief.lens, solid.height)
+        if text:
+            belief.warnings.setdefault("lens", f"{text} ({moment.text})")
+
     def _begin(self, solid: SolidObserver, own: Belief, moment: Moment, belief: CameraBelief) -> None:
+        own, text = refitted_lens(moment.gray, solid.reference.shape, own, belief.lens)
+        if text:
+            belief.warnings.setdefault("lens", f"{text} ({moment.text})")
+            belief.doubt_lens(own.state.view.camera)
         telemetry = moment.frame.telemetry
         if self._telemetry and telemetry is not None:
             own, contradiction = with_telemetry(own, telemetry)

@@ -204,7 +204,7 @@ class SolidObserver:
         Returns:
             It in its own frame, or why it was not found.
         """
-        box = self._box_now(time_s, detections, taken)
+        box = self.box_now(time_s, detections, taken)
         if isinstance(box, NoGroundMap):
             return box
         if held and self._last is not None and not self._refused(time_s):
@@ -218,7 +218,7 @@ class SolidObserver:
 
     def is_elsewhere(self, time_s: float, detections: Detections) -> bool:
         """Return whether it is now detected only elsewhere than where it is believed to be."""
-        box = self._box_now(time_s, detections, ())
+        box = self.box_now(time_s, detections, ())
         if self._box is None or isinstance(box, NoGroundMap):
             return False
         middle = (self._box[:2] + self._box[2:]) / 2.0
@@ -298,7 +298,8 @@ class SolidObserver:
             self._refused_since_s = time_s
         return time_s - self._refused_since_s >= _MAX_REFUSED_S
 
-    def _box_now(self, time_s: float, detections: Detections, taken: Sequence[FloatArray]) -> FloatArray | NoGroundMap:
+    def box_now(self, time_s: float, detections: Detections, taken: Sequence[FloatArray]) -> FloatArray | NoGroundMap:
+        """Return the box (4,) that the operator or the detector gives for it, or why there is none."""
         place = self.reference.place
         if place.box_xyxy_px is not None:
             return place.box_at(time_s) if self._box is None else self._box

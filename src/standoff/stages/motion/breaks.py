@@ -13,7 +13,7 @@ FROZEN = "the picture stood still"
 JUMPED = "the clock jumped ahead"
 
 _LEAST_FROZEN_S = 2.0
-"""Films hold a picture for a frame or two, and a fixed camera over a quiet site may for longer; beyond, it is a fault of
+"""Films hold a picture for a frame or two, a fixed camera over a quiet site for longer; beyond, it is a fault of
 the link or the file."""
 
 _LEAST_JUMP_S, _JUMP_STEPS, _MOST_STEPS = 1.0, 10.0, 50
