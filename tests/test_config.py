@@ -161,6 +161,38 @@ def _inner(settings: Settings) -> object:
     return ground.inner
 
 
+def test_more_references_and_markers_stand_beside_the_first_reference() -> None:
+    several = {
+        "reference": {"square_m": 2.0},
+        "more_references": [{"square_m": 1.5}, {"corners_m": [[9, 0], [11, 0], [11, 2], [9, 2]]}],
+        "markers": [{"size_m": 1.0, "x_m": 4.0, "y_m": 1.0}],
+    }
+    described = build_ground(load_settings(overrides={"ground": several})).description
+    assert [one["place_known"] for one in described["references"]] == [True, False, True]
+    assert described["markers"] == [0]
+
+
+@pytest.mark.parametrize(
+    "ground",
+    [
+        {"more_references": [{"square_m": 1.5}]},
+        {"reference": {"square_m": 2.0}, "markers": [{"size_m": 1.0}]},
+        {"reference": {"square_m": 2.0}, "more_references": [{"square_m": 1.5, "params": {"method": "paper"}}]},
+    ],
+    ids=["no first one", "a marker without a place", "two methods"],
+)
+def test_things_that_cannot_stand_beside_each_other_are_refused(ground: dict[str, object]) -> None:
+    with pytest.raises(ConfigError):
+        load_settings(overrides={"ground": ground})
+
+
+def test_the_paper_s_method_reads_one_reference_and_nothing_else() -> None:
+    one = {"square_m": 2.0, "params": {"method": "paper"}}
+    for beside in ({"more_references": [one]}, {"markers": [{"size_m": 1.0, "x_m": 4.0, "y_m": 1.0}]}):
+        with pytest.raises(ConfigError, match="does not read them"):
+            build_ground(load_settings(overrides={"ground": {"reference": one, **beside}}))
+
+
 def test_without_a_ground_there_is_one_by_what_the_source_tells() -> None:
     assert isinstance(_inner(Settings()), FusedGround)
 

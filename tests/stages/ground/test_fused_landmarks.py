@@ -16,7 +16,17 @@ from standoff.core.homography import FloatArray
 from standoff.core.pose import View
 from standoff.core.telemetry import Telemetry
 from standoff.core.types import CameraMotion, Detections, GroundMap, ImageArray, NoCameraMotion, NoGroundMap
-from standoff.stages.ground import FusedGround, FusedParams, Reference, ReferenceParams, ReferenceShape
+from standoff.evaluation.drawn_markers import draw_marker
+from standoff.stages.ground import (
+    FusedGround,
+    FusedParams,
+    MarkerObserver,
+    MarkerPlace,
+    Reference,
+    ReferenceParams,
+    ReferenceShape,
+    marker_pattern,
+)
 from standoff.stages.ground.solid import SolidState
 from standoff.stages.ground.which_box import WHICH
 
@@ -146,6 +156,42 @@ def test_two_references_are_told_apart_whichever_the_detector_is_surer_of() -> N
             detections = Detections(detections.xyxy_px, detections.score[::-1], detections.class_id)
         error, sigma = error_and_sigma(ground.update(frame(picture(0), 0.0), detections, STILL), 0)
         assert error < 3.0 * sigma
+
+
+MARKER = MarkerPlace.lying(7, 0.9, xy_m=(-3.2, 0.2), heading_deg=20.0)
+
+
+def with_marker(k: int, place: MarkerPlace = MARKER) -> ImageArray:
+    light = picture(k, second=False) / 255.0
+    draw_marker(light, marker_pattern("apriltag36h11", place.marker_id), view(k).project(place.corners_m))
+    return np.asarray(np.clip(np.rint(light * 255.0), 0, 255), dtype=np.uint8)
+
+
+def beside_marker(camera: CameraPrior) -> FusedGround:
+    return FusedGround(references()[:1], MarkerObserver([MARKER]), camera=camera, params=FusedParams(sizes=False))
+
+
+def test_a_marker_beside_a_reference_makes_it_surer() -> None:
+    camera = CameraPrior.unknown(640, 360)
+    alone, both = following(references()[0], camera=camera), beside_marker(camera)
+    for k in range(3):
+        shown = frame(with_marker(k), k / FPS)
+        one = alone.update(shown, boxes(k, second=False), motion(k))
+        error, sigma = error_and_sigma(both.update(shown, boxes(k, second=False), motion(k)), k)
+        assert error < 3.0 * sigma
+    assert sigma < error_and_sigma(one, k)[1]
+    assert not both.description["warnings"]
+
+
+def test_a_marker_that_was_moved_is_named_and_changes_nothing() -> None:
+    astray = MarkerPlace.lying(7, 0.9, xy_m=(-4.0, 0.9), heading_deg=20.0)
+    ground = beside_marker(CameraPrior.calibrated(CAMERA))
+    for k in range(10):
+        shown = with_marker(k, MARKER if k < 3 else astray)
+        error, sigma = error_and_sigma(ground.update(frame(shown, k / FPS), boxes(k, second=False), motion(k)), k)
+        assert error < 3.0 * sigma
+    (warning,) = ground.description["warnings"]
+    assert "marker 7 lies elsewhere than stated" in warning and "frame" in warning
 
 
 def telemetry(height_m: float, pitch_deg: float = np.nan) -> Telemetry:

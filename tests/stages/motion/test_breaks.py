@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from drawn_ground import SIZE_PX
-from flown_ground import FPS, NOTHING, OTHER_GROUND, flight, frame, seen
+from flown_ground import FPS, GROUND, NOTHING, OTHER_GROUND, flight, frame, seen
 
 from standoff.core.homography import FloatArray
 from standoff.core.types import Frame, ImageArray
@@ -40,7 +40,7 @@ def test_a_whole_film_has_nothing_to_tell() -> None:
 
 @pytest.mark.parametrize("at", [4, 7])
 def test_a_cut_is_told_with_its_frame(at: int) -> None:
-    pictures = [seen(HOME, seed=k, **({"ground": OTHER_GROUND} if k >= at else {})) for k in range(10)]
+    pictures = [seen(HOME, seed=k, ground=OTHER_GROUND if k >= at else GROUND) for k in range(10)]
     (warning,) = told(film(pictures))
     assert warning.startswith(f"the picture was cut at frame {at} (")
 

@@ -153,8 +153,9 @@ class FusedGround:
         if not self._remember:
             belief.restart()
         belief.predict(moment)
-        reasons = [] if self._markers is None else [self._markers.look(moment, belief)]
-        reasons += self._references.look(moment, belief)
+        reasons = self._references.look(moment, belief)
+        if self._markers is not None:
+            reasons.append(self._markers.look(moment, belief))
         if not (belief.by_landmark and moment.held and self._sure):
             reasons += self._last_resorts.ask(moment, belief)
             self._tally.most_people = self._last_resorts.most_people
