@@ -167,7 +167,9 @@ def test_more_references_and_markers_stand_beside_the_first_reference() -> None:
         "more_references": [{"square_m": 1.5}, {"corners_m": [[9, 0], [11, 0], [11, 2], [9, 2]]}],
         "markers": [{"size_m": 1.0, "x_m": 4.0, "y_m": 1.0}],
     }
-    described = build_ground(load_settings(overrides={"ground": several})).description
+    ground = build_ground(load_settings(overrides={"ground": several}))
+    assert isinstance(ground, ScaleWatch)
+    described = ground.description
     assert [one["place_known"] for one in described["references"]] == [True, False, True]
     assert described["markers"] == [0]
 
