@@ -13,7 +13,7 @@ from standoff.core.boxes import overlaps
 from standoff.core.classes import CLASSES
 from standoff.core.errors import DataError
 from standoff.core.homography import BoolArray, FloatArray
-from standoff.core.types import FrameResult, IntArray, NoGroundMap, TextArray
+from standoff.core.types import FrameResult, GroundMap, IntArray, NoGroundMap, TextArray
 from standoff.evaluation.paper.clip import Clip, inside
 from standoff.evaluation.paper.mapped_points import MappedPoints, level_feet_px
 from standoff.evaluation.paper.snapshots import Snapshots
@@ -27,9 +27,13 @@ from standoff.stages.track.association import assign
 
 NOT_VISIBLE = "not visible"
 NOT_DETECTED = "not detected"
+NOT_BY_REFERENCE = "measured by the drone's telemetry alone"
 WRONG = f"a corner is more than {FAILURE_PX:g} px off"
 MIN_OVERLAP = 0.3
 """Smallest IoU of a box with the truth's for the two to be the same thing."""
+
+_ELSEWHERE = "telemetry"
+"""The method of maps whose site frame is not the reference's."""
 
 _ROLE = np.array([site_class.role.value for site_class in CLASSES])
 NOTHING = -1
@@ -190,9 +194,13 @@ class Notes:
             detection_row = self._rows_by_overlap(frame, detections.xyxy_px, detections.class_id)
         detected, tracked = detection_row != NOTHING, track_row != NOTHING
         watched.detected_px[frame, detected] = detections.xyxy_px[detection_row[detected]]
-        xy_m = self._turning.to_site(result.positions.xy_m[track_row[tracked]], turn)
-        watched.xy_m[frame, tracked] = xy_m
-        watched.reason[frame, tracked] = result.positions.reason[track_row[tracked]]
+        if watched.no_map[frame] == NOT_BY_REFERENCE:
+            # Distances count, places are counted from somewhere else.
+            watched.reason[frame, tracked] = NOT_BY_REFERENCE
+        else:
+            xy_m = self._turning.to_site(result.positions.xy_m[track_row[tracked]], turn)
+            watched.xy_m[frame, tracked] = xy_m
+            watched.reason[frame, tracked] = result.positions.reason[track_row[tracked]]
         watched.reason[frame, ~tracked] = NOT_DETECTED
         watched.reason[frame, np.isnan(self._clip.box_px[frame]).any(axis=1)] = NOT_VISIBLE
         self._take_distances(result, track_row)
@@ -202,9 +210,9 @@ class Notes:
         """File what is known of the map; return the turn that brings its positions to the site frame."""
         frame, ground, watched = result.frame.index, result.ground, self.watched
         true_px = self._true_px[frame]
-        if isinstance(ground, NoGroundMap):
-            watched.no_map[frame] = ground.reason
-            watched.snapshots.take_failure(result.frame, true_px, None, ground.reason)
+        if isinstance(ground, NoGroundMap) or ground.method == _ELSEWHERE:
+            watched.no_map[frame] = NOT_BY_REFERENCE if isinstance(ground, GroundMap) else ground.reason
+            watched.snapshots.take_failure(result.frame, true_px, None, str(watched.no_map[frame]))
             return 0
         error_px, turn = np.full(4, np.nan), self._turn
         if len(ground.anchors_px) == len(true_px) and np.isfinite(true_px).all():
