@@ -112,12 +112,8 @@ def _faces(
     for side in range(count):
         outward = np.array([along[side, 1], -along[side, 0]])
         if (state.view.position_m[:2] - base[side, :2]) @ outward > 0:
-            faces.append(
-                (
-                    np.stack([base[side], base[following[side]], top[following[side]], top[side]]),
-                    _SIDES[side % len(_SIDES)],
-                )
-            )
+            corners = np.stack([base[side], base[following[side]], top[following[side]], top[side]])
+            faces.append((corners, _SIDES[side % len(_SIDES)]))
     faces.append((top, _TOP))
     if sanded_side is not None:
         start, end = base[sanded_side], base[following[sanded_side]]

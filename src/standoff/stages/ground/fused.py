@@ -247,7 +247,7 @@ class FusedGround:
                 self._box = np.concatenate([outline.min(axis=0), outline.max(axis=0)])
 
     def _outline_px(self, state: SolidState) -> FloatArray:
-        """Return (4, 2) the upper corners in the picture."""
+        """Return (N, 2) the upper corners in the picture."""
         return state.view.project(self._corners_m(state))
 
     def _corners_m(self, state: SolidState) -> FloatArray:

@@ -110,6 +110,28 @@ class ReferenceShape:
             raise _shape_error("side lengths above 0 m", f"{width_m:g} m and {length_m:g} m")
         return cls(np.array([[0.0, 0.0], [width_m, 0.0], [width_m, length_m], [0.0, length_m]]))
 
+    @classmethod
+    def regular(cls, count: int, side_m: float) -> Self:
+        """Build a regular polygon, such as an octagonal footing.
+
+        Args:
+            count: Number of its sides.
+            side_m: Length of each.
+
+        Raises:
+            GroundError: The side is not a length, or there are too few or too many.
+
+        >>> ReferenceShape.regular(4, 2.0).corners_m.round(6).tolist()
+        [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]]
+        """
+        if not (np.isfinite(side_m) and side_m > 0):
+            raise _shape_error("a side length above 0 m", f"{side_m:g} m")
+        if not _FEWEST <= count <= _MOST:
+            raise _corners_error(_POLYGON, f"{count} of them")
+        angles = 2.0 * np.pi * np.arange(count) / count
+        ends = np.cumsum(side_m * np.column_stack([np.cos(angles), np.sin(angles)]), axis=0)
+        return cls(np.roll(ends - ends[-1], 1, axis=0))
+
     @property
     def sides_m(self) -> FloatArray:
         """(N,) lengths; side k runs from corner k to corner k + 1."""

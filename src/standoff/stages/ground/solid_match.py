@@ -16,7 +16,7 @@ from standoff.core.types import IntArray
 from standoff.stages.ground.edge_field import EdgeField
 from standoff.stages.ground.shape import ReferenceShape
 from standoff.stages.ground.solid import SolidState
-from standoff.stages.ground.solid_poses import Poses, poses_in_box, roll_and_pitch, to_pinhole
+from standoff.stages.ground.solid_poses import AROUND, Poses, poses_in_box, roll_and_pitch, to_pinhole
 
 _AROUND, _LEAST, _UPRIGHT = 36, 3, 3
 """Points around each of both outlines, at least on each side, and on each upright edge."""
@@ -228,10 +228,13 @@ def _ranked(score: FloatArray, poses: Poses, shape: ReferenceShape, camera: Came
     """Return the poses that a camera can have, the best first, without those that look like a better one."""
     roll, pitch = roll_and_pitch(poses.site_to_camera)
     held = (np.abs(roll) < _MAX_ROLL_RAD) & (pitch > _MIN_PITCH_RAD) & (poses.position_m[:, 2] > poses.height_m)
-    outlines_px = np.concatenate(_outlines_px(poses, shape, camera), axis=1)
+    middle = shape.corners_m.mean(axis=0)
+    around_m = poses.in_camera(middle + AROUND * (shape.corners_m - middle), np.zeros(len(shape.corners_m)))
+    # The ground around tells poses apart from which the solid itself looks the same.
+    outlines_px = np.concatenate([*_outlines_px(poses, shape, camera), to_pinhole(around_m, camera) / AROUND], axis=1)
     chosen: list[int] = []
     score = np.where(held, score, 0.0)
     for k in np.argsort(-score, kind="stable")[: int((score > 0).sum())]:
-        if not chosen or np.abs(outlines_px[chosen] - outlines_px[k]).max(axis=(1, 2)).min() > alike_px:
+        if not chosen or np.nanmax(np.abs(outlines_px[chosen] - outlines_px[k]), axis=(1, 2)).min() > alike_px:
             chosen.append(int(k))
     return np.array(chosen, dtype=np.int64)

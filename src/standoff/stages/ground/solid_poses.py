@@ -23,6 +23,9 @@ _SCALES = (0.87, 1.0, 1.15)
 _MOST_ASPECT = 1.8
 """A box may be so many times too wide or too high for what is in it."""
 
+AROUND = 3.0
+"""So many times as far from the reference's middle as its corners."""
+
 _PLACED_ROUNDS = 3
 _NEAREST_M = 0.1
 
@@ -72,6 +75,14 @@ def to_pinhole(in_camera: FloatArray, camera: Camera) -> FloatArray:
     depth = np.where(in_camera[..., 2:] > _NEAREST_M, in_camera[..., 2:], np.nan)
     pinhole: FloatArray = in_camera[..., :2] / depth * np.diag(camera.matrix)[:2] + camera.matrix[:2, 2]
     return pinhole
+
+
+def ground_around_px(view: View, shape: ReferenceShape) -> FloatArray:
+    """Return (N, 2) undistorted pixels of points of the ground around the reference, beyond its corners."""
+    middle = shape.corners_m.mean(axis=0)
+    return view.project_pinhole(
+        np.column_stack([middle + AROUND * (shape.corners_m - middle), np.zeros(len(shape.corners_m))])
+    )
 
 
 def roll_and_pitch(site_to_camera: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -30,7 +30,7 @@ from standoff.stages.ground.solid import HEIGHT, STATE, SolidState
 from standoff.stages.ground.solid_edges import Blurred
 from standoff.stages.ground.solid_fit import Belief, SolidFit, fit_solid, outline_support, side_support
 from standoff.stages.ground.solid_match import matching_states
-from standoff.stages.ground.solid_poses import roll_and_pitch
+from standoff.stages.ground.solid_poses import AROUND, ground_around_px, roll_and_pitch
 
 AMBIGUOUS = "the reference could lie in two ways"
 NOT_THERE = "no solid of the reference's shape fits the edges in its box"
@@ -51,6 +51,9 @@ _FACE_RINGS = 5
 _REFINED = 10
 _FIT_PX = 5.0
 _RIVAL_SCORE, _RIVAL_PX = 0.9, 4.0
+_MAX_SURPRISE = 16.0
+"""Four standard errors of what was known before."""
+
 _MIN_SIDE_SUPPORT, _MIN_MEAN_SUPPORT, _MIN_OTHER_SUPPORT = 0.5, 0.8, 0.85
 """So much of the sides must be seen when nothing else says that the reference is there."""
 
@@ -165,7 +168,7 @@ def _search(task: _Task, smoothing_px: float) -> Found | NoGroundMap:
             break
         prior = _prior(state, task.camera, task.height)
         fit = fit_solid(task.gray, task.shape, prior, _FIT_PX, start=state)
-        if fit is not None and _believable(fit, task.shape):
+        if fit is not None and _believable(fit, task.shape) and _expected(fit, prior, task.shape):
             score = _score_of(task, fit.state, fit.support, fit.length_px)
             if score > 0:
                 fits.append((score, Found(fit, prior)))
@@ -221,11 +224,26 @@ def _smoothed_in(gray: ImageArray, box: FloatArray, smoothing_px: float) -> Imag
 def _believable(fit: SolidFit, shape: ReferenceShape) -> bool:
     """Return whether the picture has enough of the sides: of every one, or of all but one and of the solid below."""
     count = len(shape.corners_m)
-    sides = np.sort(side_support(fit.support, fit.lower_side, count))
+    sides = side_support(fit.support, fit.lower_side, count)
+    if count == 3:
+        # Three sides can be explained from almost anywhere: of them none is to spare.
+        return bool(sides.min() >= _MIN_OTHER_SUPPORT)
+    if count > 4:
+        # A corner cut off, or a side seen end on, may be too short to have an edge; the others are enough.
+        sides = sides[fit.length_px[:count] > 0]
+    sides = np.sort(sides)
+    if len(sides) < 4:
+        return False
     if sides[0] >= _MIN_SIDE_SUPPORT and sides.mean() >= _MIN_MEAN_SUPPORT:
         return True
     lower = fit.support[(fit.lower_side >= 0) & np.isfinite(fit.support)]
     return bool(sides[1] >= _MIN_OTHER_SUPPORT and len(lower) and lower.max() >= _MIN_OTHER_SUPPORT)
+
+
+def _expected(fit: SolidFit, prior: Belief, shape: ReferenceShape) -> bool:
+    """Return whether height, lens and horizon are about as they are known; four corners are hard to explain falsely."""
+    change = fit.state.change_from(prior.state)
+    return len(shape.corners_m) == 4 or float(change @ prior.information @ change) < _MAX_SURPRISE
 
 
 def _best(fits: list[tuple[float, Found]], shape: ReferenceShape) -> Found | NoGroundMap:
@@ -234,12 +252,23 @@ def _best(fits: list[tuple[float, Found]], shape: ReferenceShape) -> Found | NoG
         return NoGroundMap(NOT_THERE)
     fits = sorted(fits, key=lambda one: -one[0])
     best_score, best = fits[0]
-    outline = _top_px(best.fit.state, shape)
     for score, other in fits[1:]:
-        apart = np.linalg.norm(_top_px(other.fit.state, shape)[_orders(shape)] - outline, axis=-1).max(axis=-1).min()
-        if score >= _RIVAL_SCORE * best_score and apart > _RIVAL_PX:
+        if score >= _RIVAL_SCORE * best_score and _apart_px(best.fit.state, other.fit.state, shape) > _RIVAL_PX:
             return NoGroundMap(AMBIGUOUS)
     return best
+
+
+def _apart_px(one: SolidState, other: SolidState, shape: ReferenceShape) -> float:
+    """Return how far apart two states put the corner that they agree on least."""
+    orders = _orders(shape)
+    apart = np.linalg.norm(_top_px(other, shape)[orders] - _top_px(one, shape), axis=-1).max(axis=-1)
+    if len(shape.corners_m) == 3:
+        # Up to four cameras see a triangle in the same place. What they disagree on is the ground around it.
+        around = np.linalg.norm(
+            ground_around_px(other.view, shape)[orders] - ground_around_px(one.view, shape), axis=-1
+        )
+        apart = np.maximum(apart, np.nan_to_num(around, nan=np.inf).max(axis=-1) / AROUND)
+    return float(apart.min())
 
 
 def _orders(shape: ReferenceShape) -> IntArray:
