@@ -54,11 +54,11 @@ def random_state(rng: np.random.Generator, shape: ReferenceShape, camera: Camera
 
 
 def top_px(shape: ReferenceShape, state: SolidState) -> FloatArray:
-    return state.view.project(np.column_stack([shape.corners_m, np.full(4, state.height_m)]))
+    return state.view.project(np.column_stack([shape.corners_m, np.full(len(shape.corners_m), state.height_m)]))
 
 
 def base_px(shape: ReferenceShape, state: SolidState) -> FloatArray:
-    return state.view.project(np.column_stack([shape.corners_m, np.zeros(4)]))
+    return state.view.project(np.column_stack([shape.corners_m, np.zeros(len(shape.corners_m))]))
 
 
 def box_around(shape: ReferenceShape, state: SolidState, margin_px: float = 4.0) -> FloatArray:
@@ -111,19 +111,21 @@ def _faces(
     shape: ReferenceShape, state: SolidState, sun_m: tuple[float, float] | None, sanded_side: int | None
 ) -> list[tuple[FloatArray, float]]:
     """Return convex polygons (N, 3) of the site and their grey levels, what is behind first."""
-    base = np.column_stack([shape.corners_m, np.zeros(4)])
+    base = np.column_stack([shape.corners_m, np.zeros(len(shape.corners_m))])
     top = base + np.array([0.0, 0.0, state.height_m])
-    following = np.roll(np.arange(4), -1)
+    count = len(base)
+    following = np.roll(np.arange(count), -1)
     faces: list[tuple[FloatArray, float]] = []
     if sun_m is not None:
         shadow = np.concatenate([shape.corners_m, shape.corners_m + sun_m])
         hull = cv2.convexHull(shadow.astype(np.float32))[:, 0].astype(np.float64)
         faces.append((np.column_stack([hull, np.zeros(len(hull))]), _SHADOW))
     along = base[following] - base
-    for side in range(4):
+    for side in range(count):
         outward = np.array([along[side, 1], -along[side, 0]])
         if (state.view.position_m[:2] - base[side, :2]) @ outward > 0:
-            faces.append((np.stack([base[side], base[following[side]], top[following[side]], top[side]]), _SIDES[side]))
+            corners = np.stack([base[side], base[following[side]], top[following[side]], top[side]])
+            faces.append((corners, _SIDES[side % len(_SIDES)]))
     faces.append((top, _TOP))
     if sanded_side is not None:
         start, end = base[sanded_side], base[following[sanded_side]]

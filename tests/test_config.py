@@ -78,6 +78,8 @@ def test_the_command_line_wins_over_the_environment_and_that_over_the_file(
         ("ground: {reference: {}}\n", "give one of square_m"),
         ("ground: {reference: {square_m: 1, rectangle_m: [1, 2]}}\n", "square_m, rectangle_m"),
         ("ground: {reference: {sides_m: [1, 1, 1, 1]}}\n", "sides_m and diagonal_m go together"),
+        ("ground: {reference: {corners_m: [[0, 0], [1, 0]]}}\n", "at least 3"),
+        ("ground: {reference: {regular_m: [5.5, 1]}}\n", "integer"),
         ("ground: {reference: {square_m: 2.89}, survey: a.yaml}\n", "either survey or reference"),
         ("- a\n- b\n", "list"),
         ("a: [\n", "YAML"),
@@ -142,9 +144,11 @@ def test_a_replacement_that_does_not_take_its_options_is_one_line() -> None:
         {"rectangle_m": [2.0, 3.0]},
         {"sides_m": [3.0, 4.0, 3.0, 4.0], "diagonal_m": 5.0},
         {"corners_m": [[0, 0], [2, 0], [2.5, 2], [0, 1.5]]},
+        {"corners_m": [[0, 0], [2, 0], [1.5, 2]]},
+        {"regular_m": [8, 1.2]},
     ],
 )
-def test_a_reference_is_described_in_any_of_four_ways(reference: dict[str, object]) -> None:
+def test_a_reference_is_described_in_any_of_five_ways(reference: dict[str, object]) -> None:
     settings = load_settings(overrides={"ground": {"reference": reference}})
     assert isinstance(_inner(settings), FusedGround)
 

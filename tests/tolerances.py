@@ -163,6 +163,10 @@ SOLID_CHI2_LEAST = 1.5
 SOLID_PX = 0.7
 """Corners of a drawn solid's top after a fit: 0.1 to 0.3 px where all edges are seen, more where few are."""
 
+POLYGON_LENGTH_REL = 0.015
+"""Lengths of some metres to some tens around a drawn polygon 100 px wide, after a search: up to three of its own widths
+away. Measured over 132 pictures of five to twelve corners and known height: 0.003 in the median, 0.007 at the worst."""
+
 CARRIED_PX = 1e-6
 """A view that explains a motion of the plane exactly, after Newton's last step."""
 

@@ -221,6 +221,10 @@ def test_a_bad_source_is_one_line_exit_2_and_no_folder(
     [
         (("--ground", "square:nonsense"), "--ground square:SIDE"),
         (("--ground", "square:-1"), "square_m"),
+        (("--ground", "polygon:0,0,2,0,1"), "6 numbers with commas for --ground polygon:X,Y"),
+        (("--ground", "polygon:0,0,2,0,1,1,1"), "8 numbers with commas"),
+        (("--ground", "polygon:0,0,1,1,1,0,0,1"), "cross each other"),
+        (("--ground", "regular:2,1.5"), "3 to 12 corners"),
         (("--reference-box", "1,2,3"), "4 numbers"),
         (("--ground", "none", "--reference-box", "1,2,3,4"), "--ground square:SIDE"),
         (("--ground", "missing.yaml"), "missing.yaml"),
@@ -308,6 +312,24 @@ def test_a_square_on_the_command_line_replaces_another_shape_in_the_file(
     ground = json.loads((tmp_path / "out" / "run.json").read_text())["ground"]
     assert ground["corners_m"] == [[0, 0], [2, 0], [2, 2], [0, 2]]
     assert (ground["params"]["method"], ground["box_xyxy_px"]) == ("paper", [100, 100, 150, 150])
+
+
+@pytest.mark.parametrize(
+    ("words", "corners"),
+    [
+        ("polygon:0,0,2,0,1,1.5", [[0, 0], [2, 0], [1, 1.5]]),
+        ("polygon:0,0,2,0,2,1,1,2,0,1,height=0.4", [[0, 0], [2, 0], [2, 1], [1, 2], [0, 1]]),
+        ("regular:4,2,height=0.4", [[0, 0], [2, 0], [2, 2], [0, 2]]),
+    ],
+)
+def test_a_polygon_on_the_command_line_is_the_reference(
+    call: Call, video: Path, site: Path, tmp_path: Path, words: str, corners: list[list[float]]
+) -> None:
+    box = ("--reference-box", "100,100,150,150", "--outputs", "")
+    call("run", video, "--config", site, "--out", tmp_path / "out", "--ground", words, *box)
+    ground = json.loads((tmp_path / "out" / "run.json").read_text())["ground"]
+    assert np.allclose(ground["corners_m"], corners)
+    assert ground["height_m"] == (0.4 if "height" in words else None)
 
 
 @pytest.mark.parametrize("factory", ["no_such_module:Thing", "cli.test_cli:unplugged"])

@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     from standoff.monitor import Run
 
 
+_SHAPES = {"square": "SIDE", "rectangle": "LENGTH,WIDTH", "regular": "SIDES,LENGTH", "polygon": "X,Y,X,Y,X,Y,..."}
+"""How `--ground` names the shapes of reference objects, and what has to follow."""
+
+
 def _numbers(text: str, count: int, option: str) -> tuple[float, ...]:
     try:
         numbers = tuple(float(part) for part in text.split(","))
@@ -34,17 +38,24 @@ def _numbers(text: str, count: int, option: str) -> tuple[float, ...]:
 
 
 def _shape_overrides(ground: str) -> dict[str, Any] | None:
-    """Translate `square:SIDE` and `rectangle:LENGTH,WIDTH`, each with `,height=H` or without, into settings."""
+    """Translate a reference object's shape, with `,height=H` or without, into settings; None if it is none."""
     kind, _, rest = ground.partition(":")
-    count = {"square": 1, "rectangle": 2}.get(kind)
-    if count is None:
+    if kind not in _SHAPES:
         return None
     lengths, _, height = rest.partition(",height=")
-    option = f"--ground {kind}:{'SIDE' if count == 1 else 'LENGTH,WIDTH'}"
-    numbers = _numbers(lengths, count, option)
+    option = f"--ground {kind}:{_SHAPES[kind]}"
     # The file's reference may have another shape; its box and method go on.
-    shape: dict[str, Any] = dict.fromkeys(("square_m", "rectangle_m", "sides_m", "diagonal_m", "corners_m", "height_m"))
-    shape[f"{kind}_m"] = numbers[0] if count == 1 else numbers
+    shape: dict[str, Any] = dict.fromkeys(
+        ("square_m", "rectangle_m", "regular_m", "sides_m", "diagonal_m", "corners_m", "height_m")
+    )
+    if kind == "polygon":
+        pairs = max((lengths.count(",") + 2) // 2, 3)
+        numbers = _numbers(lengths, 2 * pairs, option)
+        shape["corners_m"] = tuple(zip(numbers[::2], numbers[1::2], strict=True))
+    elif kind == "square":
+        shape["square_m"] = _numbers(lengths, 1, option)[0]
+    else:
+        shape[f"{kind}_m"] = _numbers(lengths, 2, option)
     if height:
         shape["height_m"] = _numbers(height, 1, f"{option},height=H")[0]
     return shape
@@ -123,8 +134,9 @@ def run(
     ground: Annotated[
         str | None,
         typer.Option(
-            help="square:SIDE or rectangle:LENGTH,WIDTH (a reference object, m; ,height=H where its top is so high "
-            "above the ground), marker:SIZE[,id=ID] (a printed marker, black square in m), survey.yaml (surveyed "
+            help="square:SIDE, rectangle:LENGTH,WIDTH, regular:SIDES,LENGTH (3 to 12 sides of this length) or "
+            "polygon:X,Y,X,Y,X,Y,... (corners in order): a reference object, m; ,height=H where its top is so high "
+            "above the ground. Or marker:SIZE[,id=ID] (a printed marker, black square in m), survey.yaml (surveyed "
             "points), auto (the default: markers of the settings, the drone's telemetry, sizes of people), or none."
         ),
     ] = None,

@@ -33,10 +33,14 @@ class _Section(BaseModel):
 
 
 class ReferenceSettings(_Section):
-    """The reference object: its true shape in one of four ways, and where to look for it."""
+    """The reference object: its true shape in one of five ways, and where to look for it."""
 
     square_m: Annotated[float | None, Field(gt=0, description="Side of a square; m.")] = None
     rectangle_m: Annotated[Point | None, Field(description="Length and width of a rectangle; m.")] = None
+    regular_m: Annotated[
+        tuple[int, float] | None,
+        Field(description="Number of sides of a regular polygon, 3 to 12, and the length of one; m."),
+    ] = None
     sides_m: Annotated[
         tuple[float, float, float, float] | None,
         Field(description="Four sides in order, counter-clockwise seen from above; m. Needs diagonal_m."),
@@ -45,8 +49,12 @@ class ReferenceSettings(_Section):
         float | None, Field(gt=0, description="From the first corner to the third; m. Goes with sides_m.")
     ] = None
     corners_m: Annotated[
-        tuple[Point, Point, Point, Point] | None,
-        Field(description="Four corners, counter-clockwise seen from above, in the site frame; m."),
+        tuple[Point, ...] | None,
+        Field(
+            min_length=3,
+            max_length=12,
+            description="Corners of a convex polygon, counter-clockwise seen from above, in the site frame; m.",
+        ),
     ] = None
     height_m: Annotated[
         float | None,
@@ -70,11 +78,10 @@ class ReferenceSettings(_Section):
 
     @model_validator(mode="after")
     def _one_shape(self) -> ReferenceSettings:
-        given = [n for n in ("square_m", "rectangle_m", "sides_m", "corners_m") if getattr(self, n) is not None]
+        ways = ("square_m", "rectangle_m", "regular_m", "sides_m", "corners_m")
+        given = [name for name in ways if getattr(self, name) is not None]
         if len(given) != 1:
-            raise ValueError(
-                f"give one of square_m, rectangle_m, sides_m, corners_m (there are {', '.join(given) or 'none'})"
-            )
+            raise ValueError(f"give one of {', '.join(ways)} (there are {', '.join(given) or 'none'})")
         if (self.sides_m is None) != (self.diagonal_m is None):
             raise ValueError("sides_m and diagonal_m go together")
         return self
@@ -85,6 +92,8 @@ class ReferenceSettings(_Section):
             return ReferenceShape.square(self.square_m)
         if self.rectangle_m is not None:
             return ReferenceShape.rectangle(*self.rectangle_m)
+        if self.regular_m is not None:
+            return ReferenceShape.regular(*self.regular_m)
         if self.sides_m is not None and self.diagonal_m is not None:
             return ReferenceShape.from_sides(self.sides_m, self.diagonal_m)
         assert self.corners_m is not None, "checked in _one_shape"
@@ -106,8 +115,8 @@ class GroundSettings(_Section):
     reference: Annotated[
         ReferenceSettings | None,
         Field(
-            description="A reference object: its shape (square_m, rectangle_m, sides_m with diagonal_m, or corners_m), "
-            "where it is (box_px, box_time_s, first_corner_px), and params (method, thresholds)."
+            description="A reference object: its shape (square_m, rectangle_m, regular_m, sides_m with diagonal_m, or "
+            "corners_m), where it is (box_px, box_time_s, first_corner_px), and params (method, thresholds)."
         ),
     ] = None
     more_references: Annotated[

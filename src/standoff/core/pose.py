@@ -85,14 +85,12 @@ class View:
     @property
     def pitch_rad(self) -> float:
         """How far the camera looks down from the horizon."""
-        return float(np.arcsin(np.clip(-self.site_to_camera[2, 2], -1.0, 1.0)))
+        return float(roll_and_pitch(self.site_to_camera)[1])
 
     @property
     def roll_rad(self) -> float:
-        """How far the picture's right side is down; 0 straight down, where every turn is one of heading."""
-        right, down, _ = self.site_to_camera
-        level = max(float(np.hypot(right[2], down[2])), 1e-9)
-        return float(np.arcsin(np.clip(-right[2] / level, -1.0, 1.0)) * np.cos(self.pitch_rad))
+        """How far the picture's right side is down."""
+        return float(roll_and_pitch(self.site_to_camera)[0])
 
     def project(self, points_m: FloatArray) -> FloatArray:
         """Show where points of the site appear, lens distortion included.
@@ -203,6 +201,22 @@ class View:
         by_view[:, :, 6] = distorted * focal
         by_view[:, :, 7] = normalised * (normalised**2).sum(axis=1, keepdims=True) * focal
         return points_px, by_view, by_point
+
+
+def roll_and_pitch(site_to_camera: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return how far the picture's right side is down, and how far the camera looks down.
+
+    Args:
+        site_to_camera: (..., 3, 3) rotations.
+
+    Returns:
+        (...) both, rad.
+    """
+    right, down, forward = site_to_camera[..., 0, 2], site_to_camera[..., 1, 2], site_to_camera[..., 2, 2]
+    pitch = np.arcsin(np.clip(-forward, -1.0, 1.0))
+    # Looking straight down there is no roll: every turn is one of heading.
+    level = np.maximum(np.hypot(right, down), 1e-9)
+    return np.arcsin(np.clip(-right / level, -1.0, 1.0)) * np.cos(pitch), pitch
 
 
 def rotation_from_vector(vector: FloatArray) -> FloatArray:

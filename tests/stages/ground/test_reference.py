@@ -91,6 +91,16 @@ def test_every_method_maps_the_footing_of_the_paper(method: ReferenceMethod) -> 
     np.testing.assert_allclose(ground.to_ground(ground.anchors_px)[0], FOOTING.corners_m, atol=1e-6)
 
 
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("corners", [3, 5])
+def test_methods_of_four_lines_refuse_other_shapes_and_say_what_to_use(method: ReferenceMethod, corners: int) -> None:
+    with pytest.raises(GroundError) as caught:
+        ReferenceGround(ReferenceShape.regular(corners, 1.5), ReferenceParams(method=method))
+    said = str(caught.value)
+    assert f"four corners for the method {method}, found one of {corners}. Use the method fused" in said
+    assert "\n" not in said
+
+
 def test_corners_of_an_uneven_shape_get_their_own_coordinates() -> None:
     gray, ground_to_image, box = seen(QUADRILATERAL, yaw_deg=200.0)
     ground = mapped(

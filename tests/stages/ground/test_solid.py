@@ -14,6 +14,8 @@ SHAPES = (
     ReferenceShape.square(2.89),
     ReferenceShape.rectangle(1.6, 3.2),
     ReferenceShape.from_sides((4.4, 2.6, 2.6, 3.0), diagonal_m=4.4),
+    ReferenceShape.from_corners([[0.0, 0.0], [3.2, 0.0], [1.0, 2.6]]),
+    ReferenceShape.regular(7, 1.2),
 )
 
 _SURFACE_M = 1e-9
@@ -34,11 +36,11 @@ def _inside(shape: ReferenceShape, height_m: float, points_m: FloatArray) -> Boo
     return np.asarray(level & (depth > _SURFACE_M).all(axis=1))
 
 
-def _all_edges() -> FloatArray:
-    """Return (12, 2, 2): corner and share of the height of both ends."""
-    around = [(k, (k + 1) % 4) for k in range(4)]
+def _all_edges(corners: int) -> FloatArray:
+    """Return (3 N, 2, 2): corner and share of the height of both ends."""
+    around = [(k, (k + 1) % corners) for k in range(corners)]
     level = [[(a, share), (b, share)] for share in (1.0, 0.0) for a, b in around]
-    return np.array(level + [[(k, 1.0), (k, 0.0)] for k in range(4)])
+    return np.array(level + [[(k, 1.0), (k, 0.0)] for k in range(corners)])
 
 
 def _name(ends: FloatArray) -> tuple[tuple[float, ...], ...]:
@@ -56,7 +58,7 @@ def test_the_edges_that_no_part_of_the_solid_hides_are_the_visible_ones() -> Non
             continue
         tried += 1
         claimed = {_name(edge) for edge in edges}
-        for (a, share_a), (b, share_b) in _all_edges():
+        for (a, share_a), (b, share_b) in _all_edges(len(shape.corners_m)):
             ends = np.array([[*shape.corners_m[int(a)], share_a], [*shape.corners_m[int(b)], share_b]])
             middle = ends.mean(axis=0) * (1.0, 1.0, state.height_m)
             ray = middle + np.linspace(0.0, 1.0, 2001)[:, None] * (state.view.position_m - middle)
@@ -69,7 +71,9 @@ def test_the_outline_of_the_whole_solid_is_the_hull_of_its_corners(seed: int) ->
     shape, state = _state(seed)
     scale = np.array([1.0, 1.0, state.height_m])
     ends = np.concatenate(visible_edges(shape, state)[0]) * scale
-    corners = np.concatenate([np.column_stack([shape.corners_m, np.full(4, z)]) for z in (0.0, state.height_m)])
+    corners = np.concatenate(
+        [np.column_stack([shape.corners_m, np.full(len(shape.corners_m), z)]) for z in (0.0, state.height_m)]
+    )
     hulls = [cv2.convexHull(state.view.project(points).astype(np.float32)) for points in (ends, corners)]
     assert cv2.contourArea(hulls[0]) == pytest.approx(cv2.contourArea(hulls[1]), rel=1e-5)
 
@@ -89,8 +93,8 @@ def test_a_side_too_narrow_to_have_two_edges_has_one_in_doubt_by_half_its_width(
     shape, tall = _state(4)
     flat = SolidState(tall.view, 0.02)
     edges, doubt_px, lower_side = visible_edges(shape, flat)
-    narrow = edges[:4, 0, 2] == 0.5
-    assert narrow.any() and (doubt_px[:4] > 0).tolist() == narrow.tolist()
+    narrow = edges[: len(shape.corners_m), 0, 2] == 0.5
+    assert narrow.any() and (doubt_px[: len(narrow)] > 0).tolist() == narrow.tolist()
     assert (lower_side == -1).all()
 
 

@@ -11,6 +11,7 @@ from standoff.stages.ground.solid_fit import Belief
 from standoff.stages.ground.turned import turned_like
 
 SQUARE = ReferenceShape.square(2.0)
+HEXAGON = ReferenceShape.regular(6, 1.5)
 AWAY = ReferenceShape.from_corners([[5.0, 1.0], [7.0, 1.0], [7.0, 4.0], [5.0, 4.0]])
 QUADRILATERAL = ReferenceShape.from_sides((4.4, 2.6, 2.6, 3.0), diagonal_m=4.4)
 
@@ -24,7 +25,7 @@ def _belief(state: SolidState) -> Belief:
     return Belief(state, root @ root.T)
 
 
-@pytest.mark.parametrize(("shape", "corners"), [(SQUARE, range(4)), (AWAY, (0, 2))])
+@pytest.mark.parametrize(("shape", "corners"), [(SQUARE, range(4)), (HEXAGON, range(6)), (AWAY, (0, 2))])
 def test_the_hint_chooses_the_corner_and_the_picture_stays(shape: ReferenceShape, corners: range) -> None:
     state = _state(1, shape)
     outline = top_px(shape, state)

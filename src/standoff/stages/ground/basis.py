@@ -32,11 +32,14 @@ def reference_basis(shape: ReferenceShape) -> str:
 
     >>> reference_basis(ReferenceShape.square(2.89)), reference_basis(ReferenceShape.rectangle(2.4, 3.0))
     ('a square reference of 2.89 m', 'a rectangular reference of 2.4 by 3 m')
+    >>> reference_basis(ReferenceShape.regular(6, 1.5))
+    'a reference with 6 sides of 1.5 m'
     """
-    corners = shape.corners_m
-    sides = np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1)
+    corners, sides = shape.corners_m, shape.sides_m
+    if len(corners) != 4 and len(shape.turns_onto_itself()) == len(corners):
+        return f"a reference with {len(sides)} sides of {sides[0]:.4g} m"
     diagonals = np.linalg.norm(corners[2:] - corners[:2], axis=1)
-    if np.ptp(diagonals) > _EQUAL or np.abs(sides[:2] - sides[2:]).max() > _EQUAL:
+    if len(corners) != 4 or np.ptp(diagonals) > _EQUAL or np.abs(sides[:2] - sides[2:]).max() > _EQUAL:
         return f"a reference with sides of {', '.join(f'{side:.4g}' for side in sides)} m"
     if np.ptp(sides) < _EQUAL:
         return f"a square reference of {sides[0]:.4g} m"

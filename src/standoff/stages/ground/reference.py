@@ -42,11 +42,13 @@ class ReferenceGround:
     corner 0 starts as the one at the picture's bottom left.
 
     Args:
-        shape: The reference's true shape; it defines the site frame.
+        shape: The reference's true shape, of four corners; it defines the site frame.
         params: Settings.
         place: What the operator said of where it is.
         camera: Calibrated camera; its lens distortion is removed from edge points before lines are fitted.
 
+    Raises:
+        GroundError: The shape has other than four corners.
     """
 
     def __init__(
@@ -59,6 +61,12 @@ class ReferenceGround:
     ) -> None:
         self._shape = shape
         self._params = params if params is not None else ReferenceParams(method="oriented")
+        if len(shape.corners_m) != 4:
+            raise GroundError(
+                expected=f"a reference of four corners for the method {self._params.method}",
+                found=f"one of {len(shape.corners_m)}",
+                fix="use the method fused or refined",
+            )
         self._given = place if place is not None else GivenPlace()
         self._given_camera = camera
         self._camera = camera
@@ -254,7 +262,7 @@ def rectified_scale_m_per_px(corners_px: FloatArray, shape: ReferenceShape) -> f
     reference keeps the perimeter in px that it has in the picture; for a square each side is then the mean side.
 
     Args:
-        corners_px: (4, 2) undistorted.
+        corners_px: (N, 2) undistorted.
         shape: The true shape.
 
     Source:
@@ -264,7 +272,7 @@ def rectified_scale_m_per_px(corners_px: FloatArray, shape: ReferenceShape) -> f
     >>> round(rectified_scale_m_per_px(square_px, ReferenceShape.square(2.89)), 6)
     0.0289
     """
-    perimeter_px = float(np.linalg.norm(corners_px[ORDERS[1]] - corners_px, axis=1).sum())
+    perimeter_px = float(np.linalg.norm(np.roll(corners_px, -1, axis=0) - corners_px, axis=1).sum())
     return float(shape.sides_m.sum()) / perimeter_px
 
 

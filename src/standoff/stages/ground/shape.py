@@ -1,4 +1,4 @@
-"""The reference object's true shape: four corners in metres."""
+"""The reference object's true shape: the corners of a convex polygon in metres."""
 
 from __future__ import annotations
 
@@ -11,8 +11,13 @@ import numpy as np
 from standoff.core.errors import GroundError
 from standoff.core.homography import FloatArray
 
+_FEWEST, _MOST = 3, 12
+"""Corners. With more of them the sides of a footing get too short to be told from a curve."""
+
 _MIN_SINE = 1e-3
 """Three corners whose angle has a smaller sine count as collinear: 0.06 degrees."""
+
+_POLYGON = f"{_FEWEST} to {_MOST} corners of a convex polygon in metres"
 
 _SAME_LENGTH = 0.01
 """Lengths that differ by less than one per cent count as the same when the shape is turned onto itself."""
@@ -20,11 +25,11 @@ _SAME_LENGTH = 0.01
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReferenceShape:
-    """A convex quadrilateral lying on the ground.
+    """A convex polygon lying on the ground.
 
     Attributes:
-        corners_m: (4, 2) in the site frame, counter-clockwise seen from above; side k runs from corner k to
-            corner k + 1. The constructors from lengths put corner 0 at the origin and x along side 0.
+        corners_m: (N, 2) in the site frame, N from 3 to 12, counter-clockwise seen from above; side k runs from
+            corner k to corner k + 1. The constructors from lengths put corner 0 at the origin and x along side 0.
     """
 
     corners_m: FloatArray
@@ -33,7 +38,7 @@ class ReferenceShape:
         corners = np.array(self.corners_m, dtype=np.float64)
         _check_corners(corners)
         if _turns(corners)[0] < 0:
-            corners = corners[[0, 3, 2, 1]]
+            corners = np.roll(corners[::-1], 1, axis=0)
         corners.setflags(write=False)
         object.__setattr__(self, "corners_m", corners)
 
@@ -42,16 +47,16 @@ class ReferenceShape:
         """Take known corner coordinates; they define the site frame.
 
         Args:
-            xy_m: (4, 2), one after another around the shape, x east and y north or any other right-handed
+            xy_m: (N, 2), one after another around the shape, x east and y north or any other right-handed
                 pair. A clockwise list is turned around; the first corner stays the first.
 
         Raises:
-            GroundError: Not four finite corners of a convex quadrilateral.
+            GroundError: Not three to twelve finite corners of a convex polygon.
         """
         try:
             corners = np.array(xy_m, dtype=np.float64)
         except (TypeError, ValueError) as error:
-            raise _shape_error("four pairs of numbers", f"{xy_m!r}") from error
+            raise _corners_error("pairs of numbers", f"{xy_m!r}") from error
         return cls(corners)
 
     @classmethod
@@ -105,9 +110,31 @@ class ReferenceShape:
             raise _shape_error("side lengths above 0 m", f"{width_m:g} m and {length_m:g} m")
         return cls(np.array([[0.0, 0.0], [width_m, 0.0], [width_m, length_m], [0.0, length_m]]))
 
+    @classmethod
+    def regular(cls, count: int, side_m: float) -> Self:
+        """Build a regular polygon, such as an octagonal footing.
+
+        Args:
+            count: Number of its sides.
+            side_m: Length of each.
+
+        Raises:
+            GroundError: The side is not a length, or there are too few or too many.
+
+        >>> ReferenceShape.regular(4, 2.0).corners_m.round(6).tolist()
+        [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]]
+        """
+        if not (np.isfinite(side_m) and side_m > 0):
+            raise _shape_error("a side length above 0 m", f"{side_m:g} m")
+        if not _FEWEST <= count <= _MOST:
+            raise _corners_error(_POLYGON, f"{count} of them")
+        angles = 2.0 * np.pi * np.arange(count) / count
+        ends = np.cumsum(side_m * np.column_stack([np.cos(angles), np.sin(angles)]), axis=0)
+        return cls(np.roll(ends - ends[-1], 1, axis=0))
+
     @property
     def sides_m(self) -> FloatArray:
-        """(4,) lengths; side k runs from corner k to corner k + 1."""
+        """(N,) lengths; side k runs from corner k to corner k + 1."""
         lengths: FloatArray = np.linalg.norm(np.roll(self.corners_m, -1, axis=0) - self.corners_m, axis=1)
         return lengths
 
@@ -118,8 +145,9 @@ class ReferenceShape:
         (0, 2)
         """
         distances = np.linalg.norm(self.corners_m[:, None] - self.corners_m[None], axis=2)
-        shifted = [np.roll(distances, (-turn, -turn), axis=(0, 1)) for turn in range(4)]
-        return tuple(turn for turn in range(4) if np.allclose(shifted[turn], distances, rtol=_SAME_LENGTH, atol=0.0))
+        shifted = [np.roll(distances, (-turn, -turn), axis=(0, 1)) for turn in range(len(distances))]
+        same = [np.allclose(one, distances, rtol=_SAME_LENGTH, atol=0.0) for one in shifted]
+        return tuple(np.flatnonzero(same).tolist())
 
 
 def _turns(corners: FloatArray) -> FloatArray:
@@ -132,21 +160,30 @@ def _turns(corners: FloatArray) -> FloatArray:
 
 
 def _check_corners(corners: FloatArray) -> None:
-    expected = "four corners of a convex quadrilateral in metres"
-    if corners.shape != (4, 2):
-        raise _shape_error(expected, f"an array of shape {corners.shape}")
+    if corners.ndim != 2 or corners.shape[1] != 2 or not _FEWEST <= len(corners) <= _MOST:
+        raise _corners_error(_POLYGON, f"an array of shape {corners.shape}")
     if not np.isfinite(corners).all():
-        raise _shape_error(expected, "a coordinate that is not a finite number")
-    if (np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1) == 0).any():
-        raise _shape_error(expected, "two corners at the same place")
+        raise _corners_error(_POLYGON, "a coordinate that is not a finite number")
+    sides = np.roll(corners, -1, axis=0) - corners
+    if (np.linalg.norm(sides, axis=1) == 0).any():
+        raise _corners_error(_POLYGON, "two corners at the same place")
     turns = _turns(corners)
     if (np.abs(turns) < _MIN_SINE).any():
-        raise _shape_error(expected, "three corners on one line")
-    left = int((turns > 0).sum())
-    if left == 2:
-        raise _shape_error(expected, "sides that cross each other")
-    if left in (1, 3):
-        raise _shape_error(expected, "a corner that points inwards")
+        raise _corners_error(_POLYGON, "three corners on one line")
+    heading = np.arctan2(sides[:, 1], sides[:, 0])
+    turned = np.mod(heading - np.roll(heading, 1) + np.pi, 2.0 * np.pi) - np.pi
+    if not np.isclose(abs(turned.sum()), 2.0 * np.pi):
+        raise _corners_error(_POLYGON, "sides that cross each other")
+    if 0 < (turns > 0).sum() < len(turns):
+        raise _corners_error(_POLYGON, "a corner that points inwards")
+
+
+def _corners_error(expected: str, found: str) -> GroundError:
+    return GroundError(
+        expected=f"a reference shape of {expected}",
+        found=found,
+        fix="go around the reference from corner to corner, always the same way round",
+    )
 
 
 def _shape_error(expected: str, found: str) -> GroundError:

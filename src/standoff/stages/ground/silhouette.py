@@ -26,8 +26,8 @@ def silhouettes(state: SolidState, outline_px: FloatArray, shape: ReferenceShape
     """Give the states in which some sides of an outline are edges of the base, and the others of the top.
 
     Args:
-        state: In which all four are the top's.
-        outline_px: (4, 2) corners in the shape's order, undistorted.
+        state: In which all are the top's.
+        outline_px: (N, 2) corners in the shape's order, undistorted.
         shape: Of the reference.
     """
     facing = np.flatnonzero(facing_sides(shape, state.view))

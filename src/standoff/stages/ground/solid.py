@@ -85,7 +85,7 @@ class EdgeSamples:
 
 
 def facing_sides(shape: ReferenceShape, view: View) -> BoolArray:
-    """Return (4,) which upright sides face the camera."""
+    """Return (N,) which upright sides face the camera."""
     starts, ends = shape.corners_m, np.roll(shape.corners_m, -1, axis=0)
     along = ends - starts
     outward = np.column_stack([along[:, 1], -along[:, 0]])
@@ -128,7 +128,7 @@ def _upright(corners: FloatArray) -> FloatArray:
 
 
 def _strip_widths_px(shape: ReferenceShape, state: SolidState) -> FloatArray:
-    """Return (4,) how far apart the middles of the upper and the lower edge of each side appear, across the edge."""
+    """Return (N,) how far apart the middles of the upper and the lower edge of each side appear, across the edge."""
     corners = shape.corners_m
     following = np.roll(corners, -1, axis=0)
     middle = (corners + following) / 2.0

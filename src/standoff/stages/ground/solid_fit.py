@@ -187,7 +187,7 @@ def _settled(samples: EdgeSamples, looks: Looks, state: SolidState) -> EdgeSampl
     offset_px = _medians(residual, found, samples)
     z_share, doubt_px = samples.z_share.copy(), samples.doubt_px.copy()
     expected = state.view.project(samples.points_m(state.height_m))
-    for edge in np.flatnonzero(samples.doubt_px > _WORTH_SETTLING_PX):
+    for edge in np.flatnonzero((samples.doubt_px > _WORTH_SETTLING_PX) & (samples.length_px > 0)):
         mine = samples.edge == edge
         for share in (0.0, 1.0):
             places = np.column_stack([samples.xy_m[mine], np.full(mine.sum(), share * state.height_m)])

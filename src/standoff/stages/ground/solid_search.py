@@ -1,14 +1,16 @@
 """Find the reference in a box of one picture when nothing is known of where the camera is.
 
-Every quadrilateral that the edges in the box make is taken for the top of the solid and for its base, each way round
-and from both places from which a camera could see it so. The whole solid is then laid over the picture, and the
-place wins at which the picture has most of its edges.
+Of a solid with four corners, every quadrilateral that the edges in the box make is taken for the top and for the base,
+each way round and from both places from which a camera could see it so. One with other corners is laid over the edges
+from everywhere and pulled to those nearby (`solid_match`). The whole solid is then laid over the picture, and the place
+wins at which the picture has most of its edges.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 
 import cv2
 import numpy as np
@@ -16,8 +18,9 @@ import numpy as np
 from standoff.core.camera import Camera, CameraPrior
 from standoff.core.homography import FloatArray
 from standoff.core.pose import LENS, SHIFT, TURN, View
-from standoff.core.types import ImageArray, NoGroundMap
-from standoff.stages.ground.edges import between_pixels, canny, sobel_gradients
+from standoff.core.types import ImageArray, IntArray, NoGroundMap
+from standoff.stages.ground.edge_field import EdgeField
+from standoff.stages.ground.edges import Edges, between_pixels, canny, sobel_gradients
 from standoff.stages.ground.oriented import likely_quadrilaterals, noise_thresholds
 from standoff.stages.ground.outline import BOX_OUTSIDE, TOO_FEW_EDGES, undistorted_box
 from standoff.stages.ground.quadrilateral import NO_QUADRILATERAL, ORDERS
@@ -26,6 +29,8 @@ from standoff.stages.ground.silhouette import silhouettes
 from standoff.stages.ground.solid import HEIGHT, STATE, SolidState
 from standoff.stages.ground.solid_edges import Blurred
 from standoff.stages.ground.solid_fit import Belief, SolidFit, fit_solid, outline_support, side_support
+from standoff.stages.ground.solid_match import matching_states
+from standoff.stages.ground.solid_poses import AROUND, ground_around_px
 
 AMBIGUOUS = "the reference could lie in two ways"
 NOT_THERE = "no solid of the reference's shape fits the edges in its box"
@@ -42,9 +47,13 @@ _ROLL_SIGMA_RAD = np.deg2rad(5.0)
 _MAX_ROLL_RAD = np.deg2rad(30.0)
 _MIN_PITCH_RAD = np.deg2rad(5.0)
 _BARE_COST, _ROLL_COST, _PATCHY = 0.45, 0.1, 0.33
+_FACE_RINGS = 5
 _REFINED = 10
 _FIT_PX = 5.0
 _RIVAL_SCORE, _RIVAL_PX = 0.9, 4.0
+_MAX_SURPRISE = 16.0
+"""Four standard errors of what was known before."""
+
 _MIN_SIDE_SUPPORT, _MIN_MEAN_SUPPORT, _MIN_OTHER_SUPPORT = 0.5, 0.8, 0.85
 """So much of the sides must be seen when nothing else says that the reference is there."""
 
@@ -114,58 +123,91 @@ def search_solid(
     picture = Blurred.around(gray, box.reshape(2, 2), margin)
     if picture is None:
         return NoGroundMap(BOX_OUTSIDE)
+    task = _Task(gray, picture, box_xyxy_px, box, shape, camera, height)
     found: Found | NoGroundMap = NoGroundMap(NOT_THERE)
     for smoothing_px in _SMOOTHINGS_PX:
-        found = _search(gray, picture, box, shape, camera, height, smoothing_px)
+        found = _search(task, smoothing_px)
         if isinstance(found, Found):
             break
     return found
 
 
-def _search(
-    gray: ImageArray,
-    picture: Blurred,
-    box: FloatArray,
-    shape: ReferenceShape,
-    camera: CameraPrior,
-    height: HeightPrior,
-    smoothing_px: float,
-) -> Found | NoGroundMap:
-    outlines = _outlines(gray, box, camera.camera, smoothing_px)
-    if isinstance(outlines, NoGroundMap):
-        return outlines
-    states = [state for outline in outlines for state in _states(outline, shape, camera.camera, height)]
-    if not states:
-        return NoGroundMap(NO_QUADRILATERAL)
-    scores = np.array([_score(picture, shape, state, box) for state in states])
-    leading = [states[k] for k in np.argsort(-scores, kind="stable")[:_MIXED]]
-    mixed = [other for state in leading for other in _mixed(state, shape)]
-    states += mixed
-    scores = np.concatenate([scores, [_score(picture, shape, state, box) for state in mixed]])
+@dataclass(frozen=True, slots=True, eq=False)
+class _Task:
+    """What is looked for, and where.
+
+    Attributes:
+        gray: (H, W) the whole picture.
+        picture: Around the reference.
+        detected: (4,) box of the reference.
+        box: (4,) the same with a margin, in which edges count.
+        shape: Of the reference.
+        camera: What is known of it.
+        height: What is known of the reference's.
+    """
+
+    gray: ImageArray
+    picture: Blurred
+    detected: FloatArray
+    box: FloatArray
+    shape: ReferenceShape
+    camera: CameraPrior
+    height: HeightPrior
+
+
+def _search(task: _Task, smoothing_px: float) -> Found | NoGroundMap:
+    edges = _edges(task, smoothing_px)
+    if isinstance(edges, NoGroundMap):
+        return edges
+    states = _by_quadrilaterals(task, edges) if len(task.shape.corners_m) == 4 else _by_matching(task, edges)
+    if isinstance(states, NoGroundMap):
+        return states
     fits: list[tuple[float, Found]] = []
-    for k in np.argsort(-scores, kind="stable")[: _REFINED * len(height.tried_m)]:
+    for state in states[: _REFINED * len(task.height.tried_m)]:
         if len(fits) == _REFINED:
             break
-        prior = _prior(states[k], camera, height)
-        fit = fit_solid(gray, shape, prior, _FIT_PX, start=states[k])
-        if fit is not None and _believable(fit, shape):
-            score = _score_of(fit.support, fit.length_px, picture, shape, fit.state, box)
+        prior = _prior(state, task.camera, task.height)
+        fit = fit_solid(task.gray, task.shape, prior, _FIT_PX, start=state)
+        if fit is not None and _believable(fit, task.shape) and _expected(fit, prior, task.shape):
+            score = _score_of(task, fit.state, fit.support, fit.length_px)
             if score > 0:
                 fits.append((score, Found(fit, prior)))
-    return _best(fits, shape)
+    return _best(fits, task.shape)
 
 
-def _outlines(gray: ImageArray, box: FloatArray, camera: Camera, smoothing_px: float) -> FloatArray | NoGroundMap:
-    """Return (Q, 4, 2) quadrilaterals in a box; smoothing finds faint edges in noise, and loses fine ones."""
-    if smoothing_px > 0:
-        gray = _smoothed_in(gray, box, smoothing_px)
-    gradients = sobel_gradients(gray, box)
+def _by_quadrilaterals(task: _Task, edges: Edges) -> list[SolidState] | NoGroundMap:
+    """Return the states that quadrilaterals of edges speak for, the best first."""
+    outlines = likely_quadrilaterals(edges, undistorted_box(task.box, task.camera.camera), _QUADRILATERALS)
+    states = [state for outline in outlines for state in _states(outline, task.shape, task.camera.camera, task.height)]
+    if not states:
+        return NoGroundMap(NO_QUADRILATERAL)
+    scores = [_score(task, state) for state in states]
+    leading = [states[k] for k in np.argsort(-np.array(scores), kind="stable")[:_MIXED]]
+    mixed = [other for state in leading for other in _mixed(state, task.shape)]
+    states += mixed
+    scores += [_score(task, state) for state in mixed]
+    return [states[k] for k in np.argsort(-np.array(scores), kind="stable")]
+
+
+def _by_matching(task: _Task, edges: Edges) -> list[SolidState]:
+    """Return the states whose outlines come to rest on edges, the best first."""
+    camera = task.camera.camera
+    field = EdgeField(edges, undistorted_box(task.box, camera))
+    detected = undistorted_box(task.detected, camera)
+    # Heights adapt, so that every other one will do to begin with.
+    states = matching_states(field, detected, task.shape, camera, task.height.tried_m[::2], task.height.sigma_m)
+    scores = np.array([_score(task, state) for state in states])
+    return [states[k] for k in np.argsort(-scores, kind="stable")]
+
+
+def _edges(task: _Task, smoothing_px: float) -> Edges | NoGroundMap:
+    """Return the undistorted edges in the box; smoothing finds faint ones in noise, and loses fine ones."""
+    gray = task.gray if smoothing_px == 0 else _smoothed_in(task.gray, task.box, smoothing_px)
+    gradients = sobel_gradients(gray, task.box)
     if gradients is None:
         return NoGroundMap(BOX_OUTSIDE)
-    edges = between_pixels(canny(gradients, *noise_thresholds(gradients)), gradients).undistorted(camera)
-    if len(edges) < _MIN_EDGES:
-        return NoGroundMap(TOO_FEW_EDGES)
-    return likely_quadrilaterals(edges, undistorted_box(box, camera), _QUADRILATERALS)
+    edges = between_pixels(canny(gradients, *noise_thresholds(gradients)), gradients).undistorted(task.camera.camera)
+    return edges if len(edges) >= _MIN_EDGES else NoGroundMap(TOO_FEW_EDGES)
 
 
 def _smoothed_in(gray: ImageArray, box: FloatArray, smoothing_px: float) -> ImageArray:
@@ -182,11 +224,26 @@ def _smoothed_in(gray: ImageArray, box: FloatArray, smoothing_px: float) -> Imag
 def _believable(fit: SolidFit, shape: ReferenceShape) -> bool:
     """Return whether the picture has enough of the sides: of every one, or of all but one and of the solid below."""
     count = len(shape.corners_m)
-    sides = np.sort(side_support(fit.support, fit.lower_side, count))
+    sides = side_support(fit.support, fit.lower_side, count)
+    if count == 3:
+        # Three sides can be explained from almost anywhere: of them none is to spare.
+        return bool(sides.min() >= _MIN_OTHER_SUPPORT)
+    if count > 4:
+        # A corner cut off, or a side seen end on, may be too short to have an edge; the others are enough.
+        sides = sides[fit.length_px[:count] > 0]
+    sides = np.sort(sides)
+    if len(sides) < 4:
+        return False
     if sides[0] >= _MIN_SIDE_SUPPORT and sides.mean() >= _MIN_MEAN_SUPPORT:
         return True
     lower = fit.support[(fit.lower_side >= 0) & np.isfinite(fit.support)]
     return bool(sides[1] >= _MIN_OTHER_SUPPORT and len(lower) and lower.max() >= _MIN_OTHER_SUPPORT)
+
+
+def _expected(fit: SolidFit, prior: Belief, shape: ReferenceShape) -> bool:
+    """Return whether height, lens and horizon are about as they are known; four corners are hard to explain falsely."""
+    change = fit.state.change_from(prior.state)
+    return len(shape.corners_m) == 4 or float(change @ prior.information @ change) < _MAX_SURPRISE
 
 
 def _best(fits: list[tuple[float, Found]], shape: ReferenceShape) -> Found | NoGroundMap:
@@ -195,16 +252,29 @@ def _best(fits: list[tuple[float, Found]], shape: ReferenceShape) -> Found | NoG
         return NoGroundMap(NOT_THERE)
     fits = sorted(fits, key=lambda one: -one[0])
     best_score, best = fits[0]
-    outline = _top_px(best.fit.state, shape)
     for score, other in fits[1:]:
-        apart = np.linalg.norm(_top_px(other.fit.state, shape)[_orders(shape)] - outline, axis=-1).max(axis=-1).min()
-        if score >= _RIVAL_SCORE * best_score and apart > _RIVAL_PX:
+        if score >= _RIVAL_SCORE * best_score and _apart_px(best.fit.state, other.fit.state, shape) > _RIVAL_PX:
             return NoGroundMap(AMBIGUOUS)
     return best
 
 
-def _orders(shape: ReferenceShape) -> FloatArray:
-    return np.asarray(ORDERS[list(shape.turns_onto_itself())])
+def _apart_px(one: SolidState, other: SolidState, shape: ReferenceShape) -> float:
+    """Return how far apart two states put the corner that they agree on least."""
+    orders = _orders(shape)
+    apart = np.linalg.norm(_top_px(other, shape)[orders] - _top_px(one, shape), axis=-1).max(axis=-1)
+    if len(shape.corners_m) == 3:
+        # Up to four cameras see a triangle in the same place. What they disagree on is the ground around it.
+        around = np.linalg.norm(
+            ground_around_px(other.view, shape)[orders] - ground_around_px(one.view, shape), axis=-1
+        )
+        apart = np.maximum(apart, np.nan_to_num(around, nan=np.inf).max(axis=-1) / AROUND)
+    return float(apart.min())
+
+
+def _orders(shape: ReferenceShape) -> IntArray:
+    """Return (T, N) the corners in the orders in which the shape looks the same."""
+    count = len(shape.corners_m)
+    return np.asarray((np.array(shape.turns_onto_itself())[:, None] + np.arange(count)) % count)
 
 
 def _top_px(state: SolidState, shape: ReferenceShape) -> FloatArray:
@@ -246,51 +316,36 @@ def _views(corners_px: FloatArray, shape: ReferenceShape, camera: Camera, limit_
         left, _, right = np.linalg.svd(rotation)
         rotation = left @ right
         view = View(camera, middle - rotation.T @ shifts[k].ravel(), rotation)
-        roll, pitch = _roll_and_pitch(view)
-        if view.position_m[2] > 0 and abs(roll) < _MAX_ROLL_RAD and pitch > _MIN_PITCH_RAD:
+        if view.position_m[2] > 0 and abs(view.roll_rad) < _MAX_ROLL_RAD and view.pitch_rad > _MIN_PITCH_RAD:
             yield view
 
 
-def _roll_and_pitch(view: View) -> tuple[float, float]:
-    """Return how far the picture's right side is down, and how far the camera looks down; rad."""
-    right, down, forward = view.site_to_camera
-    pitch = float(np.arcsin(np.clip(-forward[2], -1.0, 1.0)))
-    # Looking straight down there is no roll: every turn is one of heading.
-    level = max(float(np.hypot(right[2], down[2])), 1e-9)
-    return float(np.arcsin(np.clip(-right[2] / level, -1.0, 1.0)) * np.cos(pitch)), pitch
-
-
-def _score(picture: Blurred, shape: ReferenceShape, state: SolidState, box: FloatArray) -> float:
+def _score(task: _Task, state: SolidState) -> float:
     """Return px of outline that the picture has where a state puts it, as `_score_of`."""
-    samples, support = outline_support(picture, shape, state)
-    return _score_of(support, samples.length_px, picture, shape, state, box)
+    samples, support = outline_support(task.picture, task.shape, state)
+    return _score_of(task, state, support, samples.length_px)
 
 
-def _score_of(
-    support: FloatArray,
-    length: FloatArray,
-    picture: Blurred,
-    shape: ReferenceShape,
-    state: SolidState,
-    box: FloatArray,
-) -> float:
+def _score_of(task: _Task, state: SolidState, support: FloatArray, length: FloatArray) -> float:
     """Return px of outline that the picture has, less what is bare of the top, less what is unlikely.
 
     Args:
+        task: What is looked for.
+        state: Where it is.
         support: (E,) share of each visible edge that the picture has.
         length: (E,) of each, px.
-        picture: Around the reference.
-        shape: Its.
-        state: Where it is.
-        box: (4,) where it was detected.
     """
     support = np.nan_to_num(support, nan=0.0)
-    corners = len(shape.corners_m)
+    corners = len(task.shape.corners_m)
     top = float((length[:corners] * (support[:corners] - _BARE_COST)).sum())
     lower = float((length[corners:] * np.maximum(support[corners:] - _BARE_COST, 0.0)).sum())
-    roll, _ = _roll_and_pitch(state.view)
-    top_px = _top_px(state, shape)
-    unlikely = _ROLL_COST * (roll / _ROLL_SIGMA_RAD) ** 2 + _outside_share(top_px, box) + _patchy_share(picture, top_px)
+    roll = state.view.roll_rad
+    top_px = _top_px(state, task.shape)
+    unlikely = (
+        _ROLL_COST * (roll / _ROLL_SIGMA_RAD) ** 2
+        + _outside_share(top_px, task.box)
+        + _patchy_share(task.picture, top_px)
+    )
     return float(top + lower - unlikely * length[:corners].sum())
 
 
@@ -298,9 +353,7 @@ def _patchy_share(picture: Blurred, top_px: FloatArray) -> float:
     """Return the share of the upper face that is much darker or brighter than the rest: half of it lies in shade."""
     if not np.isfinite(top_px).all():
         return 1.0
-    u, v = np.meshgrid(np.linspace(0.15, 0.85, 8), np.linspace(0.15, 0.85, 8))
-    u, v = u.reshape(-1, 1), v.reshape(-1, 1)
-    grid = (top_px[0] * (1 - u) + top_px[1] * u) * (1 - v) + (top_px[3] * (1 - u) + top_px[2] * u) * v
+    grid = _all_over_face(len(top_px)) @ top_px
     columns, rows = np.rint(grid - (picture.left_px, picture.top_px)).astype(np.int64).T
     height, width = picture.values.shape
     inside = (columns >= 0) & (rows >= 0) & (columns < width) & (rows < height)
@@ -309,6 +362,24 @@ def _patchy_share(picture: Blurred, top_px: FloatArray) -> float:
         return 1.0
     middle = float(np.median(values))
     return float((np.abs(values - middle) > _PATCHY * max(middle, 1.0)).mean())
+
+
+@cache
+def _all_over_face(corners: int) -> FloatArray:
+    """Return (G, N) weights of a face's corners that make points all over it, away from its sides."""
+    if corners == 4:
+        u, v = (side.ravel() for side in np.meshgrid(np.linspace(0.15, 0.85, 8), np.linspace(0.15, 0.85, 8)))
+        return np.column_stack([(1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v])
+    # Rings around the middle: the number of points on each grows with its size, as its share of the area does.
+    rings = []
+    for ring in range(1, _FACE_RINGS + 1):
+        along = (np.arange(ring) + 0.5) / ring
+        for k in range(corners):
+            weights = np.zeros((ring, corners))
+            weights[:, k], weights[:, (k + 1) % corners] = 1.0 - along, along
+            share = 0.7 * ring / _FACE_RINGS
+            rings.append(share * weights + (1.0 - share) / corners)
+    return np.concatenate(rings)
 
 
 def _outside_share(points_px: FloatArray, box: FloatArray) -> float:
@@ -325,7 +396,7 @@ def _prior(state: SolidState, camera: CameraPrior, height: HeightPrior) -> Belie
     sigma[TURN], sigma[SHIFT] = 1.0, 100.0
     sigma[LENS] = camera.focal_sigma, camera.k1_sigma
     sigma[HEIGHT] = height.sigma_m
-    roll, _ = _roll_and_pitch(state.view)
+    roll = state.view.roll_rad
     level = np.zeros(STATE)
     level[2] = -roll
     start = state.changed(level)
