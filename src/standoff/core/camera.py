@@ -6,6 +6,7 @@ Boxes `xyxy_px` use the same coordinates for their edges.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,9 +65,9 @@ class Camera:
 
     def refocused(self, focal_factor: float, k1: float) -> Camera:
         """Return the same camera with both focal lengths times a factor and another first radial coefficient."""
-        focal = np.diag([focal_factor, focal_factor, 1.0])
-        matrix = self.matrix @ focal
-        matrix[:2, 2] = self.matrix[:2, 2]
+        matrix = self.matrix.copy()
+        matrix[0, 0] *= focal_factor
+        matrix[1, 1] *= focal_factor
         return Camera(self.width_px, self.height_px, matrix, np.array([k1, *self.distortion[1:]]))
 
     def _to_normalised(self, points_px: FloatArray) -> FloatArray:
@@ -104,13 +105,16 @@ class Camera:
         jacobian[:, 1, 1] = radial + 2.0 * y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x
         return distorted, jacobian
 
-    def _unfolded(self, normalised: FloatArray) -> BoolArray:
+    def _unfolded(self, normalised: FloatArray, jacobian: FloatArray) -> BoolArray:
         """Return (N,) whether the lens polynomial still grows from the centre outwards up to each point.
 
         Beyond its first fold the polynomial shows directions a second time that no lens puts there.
+
+        Args:
+            normalised: (N, 2) undistorted.
+            jacobian: (N, 2, 2) of the distortion there.
         """
         with np.errstate(invalid="ignore", over="ignore"):
-            _, jacobian = self.distorted_with_jacobian(normalised)
             determinant = jacobian[:, 0, 0] * jacobian[:, 1, 1] - jacobian[:, 0, 1] * jacobian[:, 1, 0]
             grows = (determinant > 0) & (jacobian[:, 0, 0] + jacobian[:, 1, 1] > 0)
             unfolded: BoolArray = grows & ((normalised**2).sum(axis=1) < self._first_fold_r2())
@@ -119,8 +123,11 @@ class Camera:
     def _first_fold_r2(self) -> float:
         """Return the square of the undistorted radius at which the radial polynomial first turns back; inf if never."""
         k1, k2, _, _, k3 = self.distortion.tolist()
-        if k2 == 0.0 and k3 == 0.0:
-            return -1.0 / (3.0 * k1) if k1 < 0.0 else np.inf
+        if k3 == 0.0:
+            # The smaller positive root of 5 k2 r^4 + 3 k1 r^2 + 1, in the form that k2 = 0 does not break.
+            discriminant = 9.0 * k1 * k1 - 20.0 * k2
+            denominator = math.sqrt(discriminant) - 3.0 * k1 if discriminant >= 0.0 else 0.0
+            return 2.0 / denominator if denominator > 0.0 else math.inf
         slope_roots = np.roots([7.0 * k3, 5.0 * k2, 3.0 * k1, 1.0])
         folds_r2 = slope_roots.real[(slope_roots.real > 0) & (np.abs(slope_roots.imag) < 1e-12)]
         return float(folds_r2.min(initial=np.inf))
@@ -136,8 +143,8 @@ class Camera:
         """
         normalised = self._to_normalised(points_px)
         with np.errstate(invalid="ignore", over="ignore"):
-            distorted, _ = self.distorted_with_jacobian(normalised)
-        distorted[~self._unfolded(normalised)] = np.nan
+            distorted, jacobian = self.distorted_with_jacobian(normalised)
+        distorted[~self._unfolded(normalised, jacobian)] = np.nan
         return self._to_pixels(distorted)
 
     def undistort(self, points_px: FloatArray) -> FloatArray:
@@ -165,8 +172,8 @@ class Camera:
                         (jacobian[:, 0, 0] * error[:, 1] - jacobian[:, 1, 0] * error[:, 0]) / determinant,
                     ]
                 )
-            distorted, _ = self.distorted_with_jacobian(estimate)
-            found = self._unfolded(estimate) & (np.abs(distorted - wanted).max(axis=1, initial=0.0) < 1e-9)
+            distorted, jacobian = self.distorted_with_jacobian(estimate)
+            found = self._unfolded(estimate, jacobian) & (np.abs(distorted - wanted).max(axis=1, initial=0.0) < 1e-9)
         estimate[~found] = np.nan
         return self._to_pixels(estimate)
 

@@ -160,7 +160,7 @@ def sample_edges(shape: ReferenceShape, state: SolidState) -> EdgeSamples:
     places = edges[edge, 0] + share[:, None] * (edges[edge, 1] - edges[edge, 0])
     return EdgeSamples(
         xy_m=places[:, :2],
-        z_share=places[:, 2],
+        z_share=places[:, 2].copy(),
         edge=edge,
         points_px=state.view.project(places * scale),
         normal=normal[edge],
