@@ -117,10 +117,10 @@ class Camera:
         with np.errstate(invalid="ignore", over="ignore"):
             determinant = jacobian[:, 0, 0] * jacobian[:, 1, 1] - jacobian[:, 0, 1] * jacobian[:, 1, 0]
             grows = (determinant > 0) & (jacobian[:, 0, 0] + jacobian[:, 1, 1] > 0)
-            unfolded: BoolArray = grows & ((normalised**2).sum(axis=1) < self._first_fold_r2())
+            unfolded: BoolArray = grows & ((normalised**2).sum(axis=1) < self.first_fold_r2())
         return unfolded
 
-    def _first_fold_r2(self) -> float:
+    def first_fold_r2(self) -> float:
         """Return the square of the undistorted radius at which the radial polynomial first turns back; inf if never."""
         k1, k2, _, _, k3 = self.distortion.tolist()
         if k3 == 0.0:

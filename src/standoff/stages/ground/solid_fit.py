@@ -8,7 +8,7 @@ import numpy as np
 
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import ImageArray, IntArray
-from standoff.stages.ground.projection import project_with_jacobians
+from standoff.stages.ground.projection import project, project_with_jacobians
 from standoff.stages.ground.shape import ReferenceShape
 from standoff.stages.ground.solid import EdgeSamples, SolidState, sample_edges
 from standoff.stages.ground.solid_edges import Blurred, Looks, look_across
@@ -173,12 +173,12 @@ def _settled(samples: EdgeSamples, looks: Looks, state: SolidState) -> EdgeSampl
     residual, found, _ = _associated(samples, looks, state, _LEAST_GATE_PX + float(samples.doubt_px.max(initial=0.0)))
     offset_px = edge_medians(residual, found, samples.edge, len(samples.length_px))
     z_share, doubt_px = samples.z_share.copy(), samples.doubt_px.copy()
-    expected = state.view.project(samples.points_m(state.height_m))
+    expected = project(state.view, samples.points_m(state.height_m))
     for edge in np.flatnonzero(samples.doubt_px > _WORTH_SETTLING_PX):
         mine = samples.edge == edge
         for share in (0.0, 1.0):
             places = np.column_stack([samples.xy_m[mine], np.full(mine.sum(), share * state.height_m)])
-            moved = ((state.view.project(places) - expected[mine]) * samples.normal[mine]).sum(axis=1)
+            moved = ((project(state.view, places) - expected[mine]) * samples.normal[mine]).sum(axis=1)
             if abs(offset_px[edge] - np.median(moved)) < samples.doubt_px[edge] / 2.0:
                 z_share[mine] = share
                 doubt_px[edge] *= _DOUBT_LEFT
