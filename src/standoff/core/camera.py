@@ -141,6 +141,8 @@ class Camera:
         Returns:
             (N, 2), as seen in the picture; NaN outside the field of view that the lens polynomial can describe.
         """
+        if not self.distortion.any():
+            return _finite(points_px)
         normalised = self._to_normalised(points_px)
         with np.errstate(invalid="ignore", over="ignore"):
             distorted, jacobian = self.distorted_with_jacobian(normalised)
@@ -157,6 +159,8 @@ class Camera:
             (N, 2) pixels of an ideal pinhole camera with the same matrix; NaN where the lens model has
             no inverse (a point outside the field of view that the lens polynomial can describe).
         """
+        if not self.distortion.any():
+            return _finite(points_px)
         wanted = self._to_normalised(points_px)
         estimate = wanted.copy()
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -176,6 +180,13 @@ class Camera:
             found = self._unfolded(estimate, jacobian) & (np.abs(distorted - wanted).max(axis=1, initial=0.0) < 1e-9)
         estimate[~found] = np.nan
         return self._to_pixels(estimate)
+
+
+def _finite(points_px: FloatArray) -> FloatArray:
+    """Return (N, 2) points, rows of NaN where one is not finite."""
+    points_px = np.array(points_px, dtype=np.float64).reshape(-1, 2)
+    points_px[~np.isfinite(points_px).all(axis=1)] = np.nan
+    return points_px
 
 
 DRONE_FIELD_DEG = 72.0

@@ -11,12 +11,13 @@ from standoff.core import homography
 from standoff.core.camera import CameraPrior
 from standoff.core.homography import FloatArray
 from standoff.core.pose import CHANGES
-from standoff.core.types import CameraMotion, Detections, Frame, GroundMap, ImageArray, NoCameraMotion, NoGroundMap
+from standoff.core.types import CameraMotion, Detections, Frame, GroundMap, Luma, NoCameraMotion, NoGroundMap
 from standoff.stages.ground.basis import BETTER_REFERENCE, lens_text, reference_basis
 from standoff.stages.ground.params import ReferenceParams
 from standoff.stages.ground.pose_filter import PoseFilter
 from standoff.stages.ground.pose_map import map_from_view
 from standoff.stages.ground.prior_for import prior_for
+from standoff.stages.ground.projection import project, project_with_jacobians
 from standoff.stages.ground.reference import rectified_scale_m_per_px
 from standoff.stages.ground.shape import ReferenceShape
 from standoff.stages.ground.solid import HEIGHT, SolidState
@@ -130,14 +131,13 @@ class FusedGround:
             GroundError: The box or the camera does not fit the pictures.
         """
         self._prior_for(frame.size_px)
-        gray = frame.picture.gray()
         if not self._remember:
             self._filter = PoseFilter()
         carried = self._filter.predict(frame.time_s, motion)
         self._carry_box(carried)
-        seen = self._filter.now is not None and self._look(gray, carried)
+        seen = self._filter.now is not None and self._look(frame.picture.luma(), carried)
         if not seen:
-            reason = self._search(gray, frame.time_s, detections, motion, carried)
+            reason = self._search(frame, detections, motion, carried)
             if isinstance(reason, NoGroundMap):
                 return reason
         return self._map(frame)
@@ -150,7 +150,7 @@ class FusedGround:
             self._size_px = size_px
         return self._camera
 
-    def _look(self, gray: ImageArray, carried: bool) -> bool:
+    def _look(self, gray: Luma, carried: bool) -> bool:
         """Look for the reference where it should be; return whether it was seen there and believed."""
         now = self._filter.now
         assert now is not None
@@ -170,13 +170,13 @@ class FusedGround:
 
     def _search(
         self,
-        gray: ImageArray,
-        time_s: float,
+        frame: Frame,
         detections: Detections,
         motion: CameraMotion | NoCameraMotion,
         carried: bool,
     ) -> NoGroundMap | None:
         """Find the reference anew where it is known or detected to be; None where there is something to map with."""
+        time_s = frame.time_s
         box = self._box_now(time_s, detections)
         if isinstance(box, NoGroundMap):
             return None if carried else box
@@ -185,7 +185,7 @@ class FusedGround:
         if self._failed is not None and 0.0 <= time_s - self._failed[0] < _SEARCH_AGAIN_S:
             return None if carried else self._failed[1]
         camera, height = self._known()
-        found = search_solid(gray, box, self._shape, camera, height)
+        found = search_solid(frame.picture.gray(), box, self._shape, camera, height)
         if isinstance(found, NoGroundMap):
             # A search costs as much as many frames, and the next frame looks much like this one.
             self._failed = (time_s, found) if self._remember else None
@@ -248,14 +248,14 @@ class FusedGround:
 
     def _outline_px(self, state: SolidState) -> FloatArray:
         """Return (4, 2) the upper corners in the picture."""
-        return state.view.project(self._corners_m(state))
+        return project(state.view, self._corners_m(state))
 
     def _corners_m(self, state: SolidState) -> FloatArray:
         return np.column_stack([self._shape.corners_m, np.full(len(self._shape.corners_m), state.height_m)])
 
     def _outline_sigma_px(self, state: SolidState, covariance: FloatArray) -> float:
         """Return the standard error of where the upper corners should be, the worst of them."""
-        _, by_view, by_point = state.view.project_with_jacobians(self._corners_m(state))
+        _, by_view, by_point = project_with_jacobians(state.view, self._corners_m(state))
         jacobian = np.concatenate([by_view, by_point[:, :, 2:]], axis=2)
         variance = np.einsum("nij,jk,nik->ni", jacobian, covariance, jacobian)
         return float(np.sqrt(variance.max())) if np.isfinite(variance).all() else np.inf

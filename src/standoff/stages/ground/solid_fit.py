@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from standoff.core.homography import BoolArray, FloatArray
-from standoff.core.types import ImageArray, IntArray
+from standoff.core.types import IntArray, Luma
 from standoff.stages.ground.projection import project, project_with_jacobians
 from standoff.stages.ground.shape import ReferenceShape
 from standoff.stages.ground.solid import EdgeSamples, SolidState, sample_edges
@@ -86,7 +86,7 @@ def side_support(support: FloatArray, lower_side: IntArray, count: int) -> Float
 
 
 def fit_solid(
-    gray: ImageArray, shape: ReferenceShape, prior: Belief, half_px: float, start: SolidState | None = None
+    gray: Luma, shape: ReferenceShape, prior: Belief, half_px: float, start: SolidState | None = None
 ) -> SolidFit | None:
     """Fit a state to the edges of a picture.
 
