@@ -14,8 +14,13 @@ from standoff.stages.ground.solid import EdgeSamples, SolidState, sample_edges
 from standoff.stages.ground.solid_edges import Blurred, Looks, look_across
 from standoff.stages.ground.solid_rounds import choose_edges, edge_medians, expect_edges, normal_equations, weigh
 
-_ROUNDS, _SETTLED = 6, 4
-_LEAST_GATE_PX = 2.0
+_ROUNDS, _SETTLED_ROUNDS = 4, 2
+_STILL_PX = 0.01
+"""A round that moves no sample by more than this is the last: what is left is a fraction of it."""
+
+_LEAST_GATE_PX, _GATE_SHRINKS, _GATE_MOVES = 2.0, 0.6, 4.0
+"""Edges are looked for within a gate: that of the round before, smaller, or so many times what that round moved."""
+
 _SUPPORT_PX = 0.7
 _WORTH_SETTLING_PX, _DOUBT_LEFT = 0.2, 0.5
 """A narrow side's doubt of less than this is not worth a decision, and after one so much of it remains."""
@@ -109,16 +114,43 @@ def fit_solid(
     if picture is None:
         return None
     looks = look_across(picture, samples, half_px)
-    gate_px = half_px
-    for stage in range(_ROUNDS):
-        if stage == _SETTLED:
-            samples = _settled(samples, looks, state)
-        change = _step(samples, looks, state, prior, gate_px)
-        if change is None:
+    moved = _moved(samples, looks, prior, _Place(state, half_px), _ROUNDS)
+    if moved is None:
+        return None
+    settled = _settled(samples, looks, moved.state)
+    if settled is not samples or not moved.still:
+        moved = _moved(settled, looks, prior, moved, _SETTLED_ROUNDS)
+    return None if moved is None else _finished(settled, looks, moved.state)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Place:
+    """Where a fit is between two rounds.
+
+    Attributes:
+        state: The best so far.
+        gate_px: How far from it the picture's edges may lie in the next round.
+        still: Whether the last round moved next to nothing.
+    """
+
+    state: SolidState
+    gate_px: float
+    still: bool = False
+
+
+def _moved(samples: EdgeSamples, looks: Looks, prior: Belief, place: _Place, rounds: int) -> _Place | None:
+    """Go so many rounds, fewer where nothing moves any more; None where there is too little to fit to."""
+    for _ in range(rounds):
+        step = _step(samples, looks, place, prior)
+        if step is None:
             return None
-        state = state.changed(np.clip(change, -_MAX_CHANGE, _MAX_CHANGE))
-        gate_px = max(gate_px * 0.6, _LEAST_GATE_PX)
-    return _finished(samples, looks, state)
+        change, moved_px = step
+        gate_px = max(min(_GATE_SHRINKS * place.gate_px, _GATE_MOVES * moved_px), _LEAST_GATE_PX)
+        still = place.gate_px <= _LEAST_GATE_PX and moved_px <= _STILL_PX
+        place = _Place(place.state.changed(change), gate_px, still)
+        if still:
+            break
+    return place
 
 
 def outline_support(picture: Blurred, shape: ReferenceShape, state: SolidState) -> tuple[EdgeSamples, FloatArray]:
@@ -129,16 +161,20 @@ def outline_support(picture: Blurred, shape: ReferenceShape, state: SolidState) 
     return samples, _support(samples, looks, residual, found)
 
 
-def _step(samples: EdgeSamples, looks: Looks, state: SolidState, prior: Belief, gate_px: float) -> FloatArray | None:
-    """Return the change (9,) that one round of the fit finds, or None if there is too little to fit to."""
-    residual, found, jacobian = _associated(samples, looks, state, gate_px)
+def _step(samples: EdgeSamples, looks: Looks, place: _Place, prior: Belief) -> tuple[FloatArray, float] | None:
+    """Return the change (9,) that one round finds, and by how many px it moves a sample; None if too little is there."""
+    residual, found, jacobian = _associated(samples, looks, place.state, place.gate_px)
     weight, scatter_px = weigh(residual, found, looks.inside, samples.edge, samples.doubt_px)
-    if (weight > 0).sum() < _MIN_SAMPLES:
+    believed = weight > 0.0
+    if np.count_nonzero(believed) < _MIN_SAMPLES:
         return None
     information, pull = normal_equations(jacobian, residual, weight, scatter_px, samples.edge, samples.doubt_px)
-    pull -= prior.information @ state.change_from(prior.state)
+    pull -= prior.information @ place.state.change_from(prior.state)
     change = np.asarray(np.linalg.solve(information + prior.information, pull), dtype=np.float64)
-    return change if np.isfinite(change).all() else None
+    if not np.isfinite(change).all():
+        return None
+    change = np.clip(change, -_MAX_CHANGE, _MAX_CHANGE)
+    return change, float(np.abs(jacobian[believed] @ change).max())
 
 
 def _paired(samples: EdgeSamples, looks: Looks) -> tuple[EdgeSamples, Looks]:
@@ -169,12 +205,19 @@ def _paired(samples: EdgeSamples, looks: Looks) -> tuple[EdgeSamples, Looks]:
 
 
 def _settled(samples: EdgeSamples, looks: Looks, state: SolidState) -> EdgeSamples:
-    """Decide for each narrow side, once the other edges have fixed the state, whether its upper or lower edge shows."""
+    """Decide for each narrow side, once the other edges have fixed the state, whether its upper or lower edge shows.
+
+    Returns:
+        The very samples where there is nothing to decide.
+    """
+    narrow = np.flatnonzero(samples.doubt_px > _WORTH_SETTLING_PX)
+    if not len(narrow):
+        return samples
     residual, found, _ = _associated(samples, looks, state, _LEAST_GATE_PX + float(samples.doubt_px.max(initial=0.0)))
     offset_px = edge_medians(residual, found, samples.edge, len(samples.length_px))
     z_share, doubt_px = samples.z_share.copy(), samples.doubt_px.copy()
     expected = project(state.view, samples.points_m(state.height_m))
-    for edge in np.flatnonzero(samples.doubt_px > _WORTH_SETTLING_PX):
+    for edge in narrow:
         mine = samples.edge == edge
         for share in (0.0, 1.0):
             places = np.column_stack([samples.xy_m[mine], np.full(mine.sum(), share * state.height_m)])
