@@ -221,7 +221,7 @@ def vector_from_rotation(rotation: FloatArray) -> FloatArray:
 
 
 def _is_rotation(matrix: FloatArray) -> bool:
-    """Return whether the rows of (3, 3) are unit vectors at right angles, right-handed; by plain numbers: it is quick."""
+    """Return whether the rows of (3, 3) are unit vectors at right angles, right-handed; numpy would take longer."""
     x, y, z = matrix.tolist()
     across = [x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]]
     unit = [abs(_dot(axis, axis) - 1.0) <= _MAX_STRETCH for axis in (x, y, z)]

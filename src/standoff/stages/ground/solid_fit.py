@@ -162,7 +162,7 @@ def outline_support(picture: Blurred, shape: ReferenceShape, state: SolidState) 
 
 
 def _step(samples: EdgeSamples, looks: Looks, place: _Place, prior: Belief) -> tuple[FloatArray, float] | None:
-    """Return the change (9,) that one round finds, and by how many px it moves a sample; None if too little is there."""
+    """Return the change (9,) that one round finds, and how far it moves a sample; None if too little is there."""
     residual, found, jacobian = _associated(samples, looks, place.state, place.gate_px)
     weight, scatter_px = weigh(residual, found, looks.inside, samples.edge, samples.doubt_px)
     believed = weight > 0.0
