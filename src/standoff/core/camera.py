@@ -124,10 +124,7 @@ class Camera:
         """Return the square of the undistorted radius at which the radial polynomial first turns back; inf if never."""
         k1, k2, _, _, k3 = self.distortion.tolist()
         if k3 == 0.0:
-            # The smaller positive root of 5 k2 r^4 + 3 k1 r^2 + 1, in the form that k2 = 0 does not break.
-            discriminant = 9.0 * k1 * k1 - 20.0 * k2
-            denominator = math.sqrt(discriminant) - 3.0 * k1 if discriminant >= 0.0 else 0.0
-            return 2.0 / denominator if denominator > 0.0 else math.inf
+            return _first_root(3.0 * k1, 5.0 * k2)
         slope_roots = np.roots([7.0 * k3, 5.0 * k2, 3.0 * k1, 1.0])
         folds_r2 = slope_roots.real[(slope_roots.real > 0) & (np.abs(slope_roots.imag) < 1e-12)]
         return float(folds_r2.min(initial=np.inf))
@@ -180,6 +177,17 @@ class Camera:
             found = self._unfolded(estimate, jacobian) & (np.abs(distorted - wanted).max(axis=1, initial=0.0) < 1e-9)
         estimate[~found] = np.nan
         return self._to_pixels(estimate)
+
+
+def _first_root(slope: float, bend: float) -> float:
+    """Return the smallest positive root of 1 + slope x + bend x^2, without cancellation; inf if there is none."""
+    discriminant = slope * slope - 4.0 * bend
+    if discriminant < 0.0:
+        return math.inf
+    root = math.sqrt(discriminant)
+    if slope > 0.0:
+        return -(slope + root) / (2.0 * bend) if bend < 0.0 else math.inf
+    return 2.0 / (root - slope) if root > slope else math.inf
 
 
 def _finite(points_px: FloatArray) -> FloatArray:
