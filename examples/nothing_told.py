@@ -17,33 +17,19 @@ from standoff.core import homography
 from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.homography import FloatArray
 from standoff.core.pose import View
-from standoff.core.types import CameraMotion, Detections, Frame, GroundMap, ImageArray
+from standoff.core.types import CameraMotion, Detections, Frame, GroundMap
+from standoff.stages.frames.pictures import ArrayPicture
 from standoff.stages.ground import FusedGround, load_camera
 
 _PAIR = np.array([[0.42, 0.6], [0.58, 0.6]])
 """Two points of the picture, as shares of it, whose distance on the ground is compared."""
 
 
-class _NoPicture:
-    """Stands in for a picture that nothing looks at."""
-
-    def __init__(self, width_px: int, height_px: int) -> None:
-        self.width_px, self.height_px = width_px, height_px
-
-    def bgr(self) -> ImageArray:
-        return np.zeros((self.height_px, self.width_px, 3), dtype=np.uint8)
-
-    def resized_bgr(self, width_px: int, height_px: int) -> ImageArray:
-        return np.zeros((height_px, width_px, 3), dtype=np.uint8)
-
-    def gray(self) -> ImageArray:
-        return np.zeros((self.height_px, self.width_px), dtype=np.uint8)
-
-
 def scale_error(clip: Path) -> tuple[float, float] | str:
     """Return the logarithm of how many times too long lengths are at the clip's end, and its standard error."""
     camera = load_camera(clip / "camera.yaml")
     size_px = camera.width_px, camera.height_px
+    nothing_to_see = ArrayPicture(np.zeros((camera.height_px, camera.width_px, 3), dtype=np.uint8))
     frames = pq.read_table(clip / "frames.parquet").to_pydict()
     rows = pq.read_table(clip / "detections.parquet").to_pydict()
     frame_of, boxes = np.array(rows["frame"]), np.array([rows[f"{side}_px"] for side in ("x1", "y1", "x2", "y2")]).T
@@ -59,7 +45,7 @@ def scale_error(clip: Path) -> tuple[float, float] | str:
         mine = frame_of == k
         detections = Detections(boxes[mine], scores[mine], classes[mine])
         motion = _motion(views[0], view, frames["time_s"][0])
-        result = ground.update(Frame(clip.name, k, time_s, _NoPicture(*size_px)), detections, motion)
+        result = ground.update(Frame(clip.name, k, time_s, nothing_to_see), detections, motion)
     if not isinstance(result, GroundMap):
         return str(getattr(result, "reason", "no frame"))
     pair_px = _PAIR * size_px

@@ -10,7 +10,8 @@ import numpy as np
 from standoff.core import homography
 from standoff.core.camera import Camera
 from standoff.core.homography import FloatArray
-from standoff.core.types import Frame, ImageArray
+from standoff.core.types import Frame, ImageArray, Luma
+from standoff.stages.frames.pictures import halved
 
 SIZE_PX = (480, 360)
 _ROUGHNESS = cv2.GaussianBlur(np.random.default_rng(5).normal(0.0, 60.0, (512, 512)), (0, 0), 2.0)
@@ -40,6 +41,12 @@ class GrayPicture:
 
     def gray(self) -> ImageArray:
         return self.pixels
+
+    def luma(self) -> Luma:
+        return self.pixels
+
+    def halved_gray(self, times: int) -> ImageArray:
+        return halved(self.pixels, times)
 
 
 def frame(gray: ImageArray, time_s: float = 0.0) -> Frame:

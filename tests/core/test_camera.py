@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tolerances import DISTORTION_PX, ITERATED_INVERSE_PX
+from tolerances import DISTORTION_PX, GEOMETRY_REL, ITERATED_INVERSE_PX
 
 from standoff.core.camera import DRONE_FIELD_DEG, Camera, CameraPrior
 from standoff.core.homography import FloatArray
@@ -127,6 +127,25 @@ def test_a_lens_of_k1_alone_is_the_limit_of_lenses_with_a_little_k2(k1: float) -
     points_px = np.column_stack([np.linspace(-2000.0, 2600.0, 200), np.linspace(-900.0, 1400.0, 200)])
     plain, nearly = (Camera(640, 480, _MATRIX, np.array([k1, k2, 0.0, 0.0, 0.0])) for k2 in (0.0, 1e-12))
     np.testing.assert_allclose(plain.distort(points_px), nearly.distort(points_px), atol=DISTORTION_PX)
+
+
+@given(st.floats(-0.5, 0.5), st.floats(-0.2, 0.2))
+def test_a_lens_folds_where_its_polynomial_first_stops_growing(k1: float, k2: float) -> None:
+    fold_r2 = Camera(640, 480, _MATRIX, np.array([k1, k2, 0.0, 0.0, 0.0])).first_fold_r2()
+    r2 = np.linspace(0.0, min(fold_r2, 50.0), 200)[:-1]
+    assert (1.0 + r2 * (3.0 * k1 + r2 * 5.0 * k2) > 0.0).all()
+    if np.isfinite(fold_r2):
+        slope = 1.0 + fold_r2 * (3.0 * k1 + fold_r2 * 5.0 * k2)
+        terms = 1.0 + fold_r2 * (abs(3.0 * k1) + fold_r2 * abs(5.0 * k2))
+        assert abs(slope) <= GEOMETRY_REL * terms
+
+
+def test_without_distortion_a_point_stays_where_it_is_and_what_is_not_finite_is_nan() -> None:
+    camera = Camera(640, 480, _MATRIX, np.zeros(5))
+    points_px = np.array([[10.5, 20.25], [np.inf, 1.0], [np.nan, 1.0]])
+    for moved in (camera.distort(points_px), camera.undistort(points_px)):
+        np.testing.assert_array_equal(moved, [[10.5, 20.25], [np.nan, np.nan], [np.nan, np.nan]])
+        assert moved is not points_px
 
 
 def test_an_unknown_camera_has_a_drone_s_field_in_any_picture() -> None:

@@ -6,6 +6,7 @@ Boxes `xyxy_px` use the same coordinates for their edges.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,9 +65,9 @@ class Camera:
 
     def refocused(self, focal_factor: float, k1: float) -> Camera:
         """Return the same camera with both focal lengths times a factor and another first radial coefficient."""
-        focal = np.diag([focal_factor, focal_factor, 1.0])
-        matrix = self.matrix @ focal
-        matrix[:2, 2] = self.matrix[:2, 2]
+        matrix = self.matrix.copy()
+        matrix[0, 0] *= focal_factor
+        matrix[1, 1] *= focal_factor
         return Camera(self.width_px, self.height_px, matrix, np.array([k1, *self.distortion[1:]]))
 
     def _to_normalised(self, points_px: FloatArray) -> FloatArray:
@@ -104,23 +105,26 @@ class Camera:
         jacobian[:, 1, 1] = radial + 2.0 * y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x
         return distorted, jacobian
 
-    def _unfolded(self, normalised: FloatArray) -> BoolArray:
+    def _unfolded(self, normalised: FloatArray, jacobian: FloatArray) -> BoolArray:
         """Return (N,) whether the lens polynomial still grows from the centre outwards up to each point.
 
         Beyond its first fold the polynomial shows directions a second time that no lens puts there.
+
+        Args:
+            normalised: (N, 2) undistorted.
+            jacobian: (N, 2, 2) of the distortion there.
         """
         with np.errstate(invalid="ignore", over="ignore"):
-            _, jacobian = self.distorted_with_jacobian(normalised)
             determinant = jacobian[:, 0, 0] * jacobian[:, 1, 1] - jacobian[:, 0, 1] * jacobian[:, 1, 0]
             grows = (determinant > 0) & (jacobian[:, 0, 0] + jacobian[:, 1, 1] > 0)
-            unfolded: BoolArray = grows & ((normalised**2).sum(axis=1) < self._first_fold_r2())
+            unfolded: BoolArray = grows & ((normalised**2).sum(axis=1) < self.first_fold_r2())
         return unfolded
 
-    def _first_fold_r2(self) -> float:
+    def first_fold_r2(self) -> float:
         """Return the square of the undistorted radius at which the radial polynomial first turns back; inf if never."""
         k1, k2, _, _, k3 = self.distortion.tolist()
-        if k2 == 0.0 and k3 == 0.0:
-            return -1.0 / (3.0 * k1) if k1 < 0.0 else np.inf
+        if k3 == 0.0:
+            return _first_root(3.0 * k1, 5.0 * k2)
         slope_roots = np.roots([7.0 * k3, 5.0 * k2, 3.0 * k1, 1.0])
         folds_r2 = slope_roots.real[(slope_roots.real > 0) & (np.abs(slope_roots.imag) < 1e-12)]
         return float(folds_r2.min(initial=np.inf))
@@ -134,10 +138,12 @@ class Camera:
         Returns:
             (N, 2), as seen in the picture; NaN outside the field of view that the lens polynomial can describe.
         """
+        if not self.distortion.any():
+            return _finite(points_px)
         normalised = self._to_normalised(points_px)
         with np.errstate(invalid="ignore", over="ignore"):
-            distorted, _ = self.distorted_with_jacobian(normalised)
-        distorted[~self._unfolded(normalised)] = np.nan
+            distorted, jacobian = self.distorted_with_jacobian(normalised)
+        distorted[~self._unfolded(normalised, jacobian)] = np.nan
         return self._to_pixels(distorted)
 
     def undistort(self, points_px: FloatArray) -> FloatArray:
@@ -150,6 +156,8 @@ class Camera:
             (N, 2) pixels of an ideal pinhole camera with the same matrix; NaN where the lens model has
             no inverse (a point outside the field of view that the lens polynomial can describe).
         """
+        if not self.distortion.any():
+            return _finite(points_px)
         wanted = self._to_normalised(points_px)
         estimate = wanted.copy()
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -165,10 +173,28 @@ class Camera:
                         (jacobian[:, 0, 0] * error[:, 1] - jacobian[:, 1, 0] * error[:, 0]) / determinant,
                     ]
                 )
-            distorted, _ = self.distorted_with_jacobian(estimate)
-            found = self._unfolded(estimate) & (np.abs(distorted - wanted).max(axis=1, initial=0.0) < 1e-9)
+            distorted, jacobian = self.distorted_with_jacobian(estimate)
+            found = self._unfolded(estimate, jacobian) & (np.abs(distorted - wanted).max(axis=1, initial=0.0) < 1e-9)
         estimate[~found] = np.nan
         return self._to_pixels(estimate)
+
+
+def _first_root(slope: float, bend: float) -> float:
+    """Return the smallest positive root of 1 + slope x + bend x^2, without cancellation; inf if there is none."""
+    discriminant = slope * slope - 4.0 * bend
+    if discriminant < 0.0:
+        return math.inf
+    root = math.sqrt(discriminant)
+    if slope > 0.0:
+        return -(slope + root) / (2.0 * bend) if bend < 0.0 else math.inf
+    return 2.0 / (root - slope) if root > slope else math.inf
+
+
+def _finite(points_px: FloatArray) -> FloatArray:
+    """Return (N, 2) points, rows of NaN where one is not finite."""
+    points_px = np.array(points_px, dtype=np.float64).reshape(-1, 2)
+    points_px[~np.isfinite(points_px).all(axis=1)] = np.nan
+    return points_px
 
 
 DRONE_FIELD_DEG = 72.0

@@ -10,6 +10,7 @@ Covariances of views are of these.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Self
 
@@ -25,7 +26,7 @@ CHANGES = 8
 TURN, SHIFT, POSE, LENS = slice(0, 3), slice(3, 6), slice(0, 6), slice(6, 8)
 """Their places in a change."""
 
-_MAX_SKEW = np.eye(3) * 1e-5 + 1e-9
+_MAX_STRETCH, _MAX_SKEW = 1e-5, 1e-9
 """A rotation's axes may miss being unit vectors by so much, and right angles hardly: matrices are read from files."""
 
 
@@ -48,8 +49,7 @@ class View:
         rotation = np.array(self.site_to_camera, dtype=np.float64)
         if position.shape != (3,) or rotation.shape != (3, 3):
             raise ValueError(f"position must be (3,), rotation (3, 3), not {position.shape} and {rotation.shape}")
-        askew = np.abs(rotation @ rotation.T - np.eye(3))
-        if not (askew <= _MAX_SKEW).all() or np.linalg.det(rotation) < 0:
+        if not _is_rotation(rotation):
             raise ValueError("site_to_camera must be a rotation")
         position.setflags(write=False)
         rotation.setflags(write=False)
@@ -225,15 +225,17 @@ def rotation_from_vector(vector: FloatArray) -> FloatArray:
     >>> np.round(rotation_from_vector(np.array([0.0, 0.0, np.pi / 2])) @ [1.0, 0.0, 0.0], 9) + 0.0
     array([0., 1., 0.])
     """
-    angle = float(np.linalg.norm(vector))
-    x, y, z = vector
-    cross: FloatArray = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    if angle < 1e-8:
-        return np.eye(3) + cross
-    rotation: FloatArray = (
-        np.eye(3) + np.sin(angle) / angle * cross + (1.0 - np.cos(angle)) / angle**2 * (cross @ cross)
+    x, y, z = (float(component) for component in vector)
+    angle = math.sqrt(x * x + y * y + z * z)
+    # Both factors at their limits, where the quotients would lose them.
+    turned, bent = (1.0, 0.5) if angle < 1e-8 else (math.sin(angle) / angle, (1.0 - math.cos(angle)) / angle**2)
+    return np.array(
+        [
+            [1.0 - bent * (y * y + z * z), bent * x * y - turned * z, bent * x * z + turned * y],
+            [bent * x * y + turned * z, 1.0 - bent * (x * x + z * z), bent * y * z - turned * x],
+            [bent * x * z - turned * y, bent * y * z + turned * x, 1.0 - bent * (x * x + y * y)],
+        ]
     )
-    return rotation
 
 
 def vector_from_rotation(rotation: FloatArray) -> FloatArray:
@@ -242,12 +244,24 @@ def vector_from_rotation(rotation: FloatArray) -> FloatArray:
     >>> np.round(vector_from_rotation(rotation_from_vector(np.array([0.1, -0.2, 0.3]))), 9)
     array([ 0.1, -0.2,  0.3])
     """
-    axis = np.array([rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1]])
-    sine, cosine = float(np.linalg.norm(axis)) / 2.0, (float(np.trace(rotation)) - 1.0) / 2.0
-    if sine < 1e-9:
-        return axis / 2.0
-    vector: FloatArray = axis / (2.0 * sine) * np.arctan2(sine, cosine)
-    return vector
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = rotation.tolist()
+    x, y, z = zy - yz, xz - zx, yx - xy
+    sine, cosine = math.sqrt(x * x + y * y + z * z) / 2.0, (xx + yy + zz - 1.0) / 2.0
+    factor = 0.5 if sine < 1e-9 else math.atan2(sine, cosine) / (2.0 * sine)
+    return np.array([x * factor, y * factor, z * factor])
+
+
+def _is_rotation(matrix: FloatArray) -> bool:
+    """Return whether the rows of (3, 3) are unit vectors at right angles, right-handed; numpy would take longer."""
+    x, y, z = matrix.tolist()
+    across = [x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]]
+    unit = [abs(_dot(axis, axis) - 1.0) <= _MAX_STRETCH for axis in (x, y, z)]
+    upright = [abs(_dot(*axes)) <= _MAX_SKEW for axes in ((x, y), (y, z), (z, x))]
+    return all(unit) and all(upright) and _dot(across, z) > 0.0
+
+
+def _dot(one: list[float], other: list[float]) -> float:
+    return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
 
 
 def poses_of_plane(plane_to_camera: FloatArray) -> tuple[FloatArray, FloatArray]:

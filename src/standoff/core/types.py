@@ -25,6 +25,19 @@ ImageArray = npt.NDArray[np.uint8]
 TextArray = npt.NDArray[np.object_]
 
 
+class Luma(Protocol):
+    """(H, W) uint8, made where it is looked at; an array is one, too."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """(H, W)."""
+        ...
+
+    def __getitem__(self, part: tuple[slice, slice], /) -> ImageArray:
+        """Return some rows and columns."""
+        ...
+
+
 class Picture(Protocol):
     """The pixels of one frame, converted only when somebody asks, at the size that they ask for."""
 
@@ -48,6 +61,17 @@ class Picture(Protocol):
 
     def gray(self) -> ImageArray:
         """Return (H, W) uint8 luma; converted once and kept."""
+        ...
+
+    def luma(self) -> Luma:
+        """Return what `gray` shows, for those who need little of it."""
+        ...
+
+    def halved_gray(self, times: int) -> ImageArray:
+        """Return `gray` averaged over two by two pixels so many times, without making the full-size picture.
+
+        An odd last row or column is dropped each time, so that all pixels have the same size.
+        """
         ...
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.errors import MissingDependency, ModelError
-from standoff.core.types import Frame, ImageArray
+from standoff.core.types import Frame, ImageArray, Luma
 from standoff.stages.detect import DetectParams, OnnxDetector, available_providers
 from standoff.stages.detect.params import Provider
 from standoff.stages.frames import frame_from_array
@@ -110,6 +110,12 @@ class _SmallPicture:
         return np.zeros((height_px, width_px, 3), np.uint8)
 
     def gray(self) -> ImageArray:
+        raise AssertionError("full-size pixels were asked for")
+
+    def luma(self) -> Luma:
+        raise AssertionError("full-size pixels were asked for")
+
+    def halved_gray(self, times: int) -> ImageArray:
         raise AssertionError("full-size pixels were asked for")
 
 

@@ -15,6 +15,7 @@ from tolerances import GRAY_LEVELS, RESIZED_LEVELS, SWSCALE_LEVELS
 
 from standoff.core.types import ImageArray, Picture
 from standoff.stages.frames import ArrayPicture, AvPicture, Scaler, frame_from_array, open_source
+from standoff.stages.frames.pictures import halved
 
 FORMATS = ["yuv420p", "yuvj420p", "yuv422p", "yuv444p", "nv12", "gray", "rgb24", "bgr24", "yuv420p10le", "rgba"]
 LIMITED, FULL = 1, 2
@@ -58,6 +59,34 @@ def test_gray_is_close_to_opencvs_gray_and_upright(pixel_format: str, size: tupl
         expected = cv2.cvtColor(picture.bgr(), cv2.COLOR_BGR2GRAY).astype(int)
         assert picture.gray().shape == expected.shape
         assert np.abs(picture.gray() - expected).max() <= GRAY_LEVELS
+
+
+@pytest.mark.parametrize("pixel_format", ["yuv420p", "yuvj420p", "gray", "bgr24"])
+@pytest.mark.parametrize("rotation_deg", [0, 90, 180])
+@pytest.mark.parametrize("color_range", [LIMITED, FULL])
+def test_parts_of_the_luma_are_parts_of_the_gray_picture(
+    pixel_format: str, rotation_deg: int, color_range: int
+) -> None:
+    picture = AvPicture(decoded(smooth(97, 65), pixel_format, color_range), rotation_deg)
+    luma = picture.luma()
+    part = luma[3:40, 5:50]
+    assert luma.shape == picture.gray().shape
+    np.testing.assert_array_equal(part, picture.gray()[3:40, 5:50])
+
+
+@pytest.mark.parametrize("pixel_format", ["yuv420p", "yuvj420p", "gray", "bgr24"])
+@pytest.mark.parametrize("rotation_deg", [0, 90, 180])
+@pytest.mark.parametrize("times", [0, 1, 2])
+def test_halved_gray_is_gray_halved(pixel_format: str, rotation_deg: int, times: int) -> None:
+    picture = AvPicture(decoded(smooth(98, 67), pixel_format), rotation_deg)
+    expected = halved(picture.gray(), times).astype(int)
+    width_px, height_px = picture.width_px >> times, picture.height_px >> times
+    assert picture.halved_gray(times).shape == expected.shape == (height_px, width_px)
+    # Stretching after rounding instead of before it: half a level each, times 255 / 219.
+    assert np.abs(picture.halved_gray(times) - expected).max() <= 1 + (times > 0)
+    plain = ArrayPicture(smooth(98, 67))
+    np.testing.assert_array_equal(plain.halved_gray(times), halved(plain.gray(), times))
+    np.testing.assert_array_equal(plain.luma()[:, :], plain.gray())
 
 
 @pytest.mark.parametrize("color_range", [LIMITED, FULL])

@@ -10,11 +10,11 @@ from tolerances import GEOMETRY_REL, POLYGON_LENGTH_REL, SOLID_PX
 
 from standoff.core.camera import CameraPrior
 from standoff.core.homography import FloatArray
-from standoff.core.pose import View
+from standoff.core.pose import View, roll_and_pitch
 from standoff.core.types import Detections, GroundMap, ImageArray, NoCameraMotion, NoGroundMap
 from standoff.stages.ground import FusedGround, GivenPlace, Reference, ReferenceParams, ReferenceShape
 from standoff.stages.ground.solid import SolidState, sample_edges
-from standoff.stages.ground.solid_poses import Poses, poses_in_box, roll_and_pitch, to_pinhole
+from standoff.stages.ground.solid_poses import Poses, poses_in_box, to_pinhole
 from standoff.stages.ground.solid_search import Found, HeightPrior, search_solid
 
 TRIANGLE = ReferenceShape.from_corners([[0.0, 0.0], [3.2, 0.0], [1.0, 2.6]])

@@ -7,7 +7,8 @@ from tolerances import SOLID_CHI2, SOLID_CHI2_LEAST, SOLID_PX
 from standoff.core.homography import FloatArray
 from standoff.stages.ground import ReferenceShape
 from standoff.stages.ground.solid import SolidState, facing_sides, sample_edges
-from standoff.stages.ground.solid_fit import Belief, SolidFit, _medians, fit_solid
+from standoff.stages.ground.solid_fit import Belief, SolidFit, fit_solid
+from standoff.stages.ground.solid_rounds import edge_medians
 
 SHAPE = ReferenceShape.rectangle(2.0, 2.89)
 CAMERA = lens(k1=-0.05)
@@ -107,4 +108,5 @@ def test_the_median_of_each_edge_is_numpy_s() -> None:
         expected = np.zeros(len(samples.length_px))
         for edge in np.unique(samples.edge[found]):
             expected[edge] = np.median(residual[found & (samples.edge == edge)])
-        np.testing.assert_array_equal(_medians(residual, found, samples), expected)
+        medians = edge_medians(residual, found, samples.edge, len(samples.length_px))
+        np.testing.assert_array_equal(medians, expected)

@@ -14,7 +14,8 @@ from standoff.core import homography
 from standoff.core.camera import Camera
 from standoff.core.errors import GroundError
 from standoff.core.homography import FloatArray
-from standoff.core.types import Detections, Frame, GroundMap, ImageArray, NoCameraMotion, NoGroundMap
+from standoff.core.types import Detections, Frame, GroundMap, ImageArray, Luma, NoCameraMotion, NoGroundMap
+from standoff.stages.frames.pictures import halved
 from standoff.stages.ground.survey_file import load_survey
 from standoff.stages.ground.surveyed import SurveyedGround
 
@@ -43,6 +44,12 @@ class _Blank:
 
     def gray(self) -> ImageArray:
         return np.zeros((self.height_px, self.width_px), np.uint8)
+
+    def luma(self) -> Luma:
+        return self.gray()
+
+    def halved_gray(self, times: int) -> ImageArray:
+        return halved(self.gray(), times)
 
 
 def blank_frame(width_px: int, height_px: int, index: int = 0) -> Frame:

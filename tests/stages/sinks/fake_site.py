@@ -21,12 +21,14 @@ from standoff.core.types import (
     Hazard,
     ImageArray,
     IntArray,
+    Luma,
     NoCameraMotion,
     NoGroundMap,
     Proximities,
     Severity,
     Tracks,
 )
+from standoff.stages.frames.pictures import halved
 
 WARNING_GAP_M = 3.0
 
@@ -57,6 +59,12 @@ class FakePicture:
     def gray(self) -> ImageArray:
         gray: ImageArray = cv2.cvtColor(self.image, cv2.COLOR_BGR2GRAY).astype(np.uint8, copy=False)
         return gray
+
+    def luma(self) -> Luma:
+        return self.gray()
+
+    def halved_gray(self, times: int) -> ImageArray:
+        return halved(self.gray(), times)
 
 
 class FakeSite:

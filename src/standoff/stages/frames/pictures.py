@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from threading import Lock
 
 import av
@@ -9,7 +10,7 @@ import cv2
 import numpy as np
 from av.video.reformatter import VideoReformatter
 
-from standoff.core.types import ImageArray
+from standoff.core.types import ImageArray, Luma
 
 _EIGHT_BIT_LUMA_FIRST = frozenset(
     ["gray", "nv12", "nv21", "nv16"]
@@ -36,6 +37,14 @@ def _read_only(image: ImageArray) -> ImageArray:
 
 def _gray_of(bgr: ImageArray) -> ImageArray:
     gray: ImageArray = cv2.cvtColor(bgr, cv2.COLOR_BGR2GRAY)
+    return gray
+
+
+def halved(gray: ImageArray, times: int) -> ImageArray:
+    """Return (H, W) averaged over two by two pixels so many times; an odd last row or column is dropped each time."""
+    for _ in range(times):
+        even = gray[: gray.shape[0] // 2 * 2, : gray.shape[1] // 2 * 2]
+        gray = cv2.resize(even, (even.shape[1] // 2, even.shape[0] // 2), interpolation=cv2.INTER_AREA)
     return gray
 
 
@@ -143,19 +152,57 @@ class AvPicture:
         """
         if self._gray is None:
             coded = self._coded_luma()
-            self._gray = _read_only(_gray_of(self.bgr()) if coded is None else self._upright(coded))
+            self._gray = _read_only(_gray_of(self.bgr()) if coded is None else self._upright(coded[:, :]))
         return self._gray
 
-    def _coded_luma(self) -> ImageArray | None:
-        """Return the luma plane, black 0 and white 255, as it lies in the file; None where there is none."""
+    def luma(self) -> Luma:
+        """Return what `gray` shows, of which only the parts that are asked for are made."""
+        coded = self._coded_luma() if self._gray is None and not self._rotation_deg else None
+        return self.gray() if coded is None else coded
+
+    def halved_gray(self, times: int) -> ImageArray:
+        """Return `gray` averaged over two by two pixels so many times.
+
+        Averaged before it is stretched, where there is a coded luma: that is a fraction of the work, and rounds
+        differently by a level here and there.
+        """
+        coded = None if self._rotation_deg else self._coded_luma()
+        return halved(self.gray(), times) if coded is None else coded.halved(times)
+
+    def _coded_luma(self) -> _CodedLuma | None:
+        """Return the luma plane as it lies in the file; None where there is none."""
         frame, plane = self._frame, self._frame.planes[0]
         if frame.format.name not in _EIGHT_BIT_LUMA_FIRST or plane.line_size < 0:
             return None
         rows = np.frombuffer(plane, np.uint8)[: plane.line_size * frame.height].reshape(frame.height, plane.line_size)
-        coded = rows[:, : frame.width]
-        if frame.color_range == _FULL_RANGE or frame.format.name.startswith(("yuvj", "gray")):
-            return coded.copy()
-        stretched: ImageArray = cv2.LUT(coded, _LIMITED_TO_FULL)
+        is_full = frame.color_range == _FULL_RANGE or frame.format.name.startswith(("yuvj", "gray"))
+        return _CodedLuma(rows[:, : frame.width], is_full)
+
+
+@dataclass(frozen=True, slots=True)
+class _CodedLuma:
+    """A decoder's luma, black 0 and white 255 in every copy of a part of it.
+
+    Attributes:
+        coded: (H, W) the decoder's own memory.
+        is_full: Whether black is 0 and white 255 there, too; else 16 and 235.
+    """
+
+    coded: ImageArray
+    is_full: bool
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        return self.coded.shape
+
+    def __getitem__(self, part: tuple[slice, slice]) -> ImageArray:
+        return self._stretched(self.coded[part])
+
+    def halved(self, times: int) -> ImageArray:
+        return self._stretched(halved(self.coded, times))
+
+    def _stretched(self, coded: ImageArray) -> ImageArray:
+        stretched: ImageArray = coded.copy() if self.is_full else cv2.LUT(coded, _LIMITED_TO_FULL)
         return stretched
 
 
@@ -205,3 +252,11 @@ class ArrayPicture:
         if self._gray is None:
             self._gray = _read_only(_gray_of(self._bgr))
         return self._gray
+
+    def luma(self) -> Luma:
+        """Return `gray`."""
+        return self.gray()
+
+    def halved_gray(self, times: int) -> ImageArray:
+        """Return `gray` averaged over two by two pixels so many times."""
+        return halved(self.gray(), times)

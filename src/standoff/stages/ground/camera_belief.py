@@ -11,7 +11,7 @@ import numpy as np
 from standoff.core.camera import Camera, CameraPrior
 from standoff.core.homography import FloatArray
 from standoff.core.pose import CHANGES, LENS, View
-from standoff.core.types import CameraMotion, Detections, Frame, ImageArray, NoCameraMotion
+from standoff.core.types import CameraMotion, Detections, Frame, ImageArray, Luma, NoCameraMotion
 from standoff.stages.ground.pose_filter import LASTING_SHARE, Estimate, PoseFilter
 from standoff.stages.ground.pose_map import length_sigma
 from standoff.stages.ground.solid import SolidState
@@ -44,8 +44,13 @@ class Moment:
 
     @cached_property
     def gray(self) -> ImageArray:
-        """(H, W) the picture."""
+        """(H, W) the whole picture."""
         return self.frame.picture.gray()
+
+    @cached_property
+    def luma(self) -> Luma:
+        """The picture by parts."""
+        return self.frame.picture.luma()
 
     @property
     def text(self) -> str:

@@ -11,6 +11,7 @@ from standoff.core.camera import Camera
 from standoff.core.homography import FloatArray
 from standoff.core.pose import LENS, POSE, View
 from standoff.core.types import CameraMotion
+from standoff.stages.ground.projection import project_with_jacobians
 from standoff.stages.ground.solid import STATE
 
 _COLUMNS, _ROWS = 7, 5
@@ -71,17 +72,16 @@ def carry(key: View, motion: CameraMotion, guess: View) -> Carried | None:
     if len(seen_px) < _MIN_POINTS:
         return None
     for _ in range(_ROUNDS):
-        points_px, by_view, by_point = now.project_with_jacobians(places)
+        points_px, by_view, _ = project_with_jacobians(now, places)
         misfit = (moved_px - points_px).ravel()
         if not np.isfinite(misfit).all():
             return None
-        pose = by_view[:, :, POSE].reshape(-1, 6)
         change = np.zeros(8)
-        change[POSE] = np.linalg.pinv(pose) @ misfit
+        change[POSE] = np.linalg.lstsq(by_view[:, :, POSE].reshape(-1, 6), misfit, rcond=None)[0]
         now = now.changed(change)
         if np.abs(change).max() < 1e-7:
             break
-    points_px, by_view, by_point = now.project_with_jacobians(places)
+    points_px, by_view, by_point = project_with_jacobians(now, places)
     misfit = (moved_px - points_px).ravel()
     rms_px = float(np.sqrt((misfit**2).mean()))
     if not rms_px < _MAX_MISFIT_PX:
@@ -98,7 +98,7 @@ def _by_key(
     then: View, places: FloatArray, by_view: FloatArray, by_point: FloatArray, solve: FloatArray, *, lens_known: bool
 ) -> FloatArray:
     """Return (9, 9): the points of the ground move with the keyframe's state, and the view now follows them."""
-    _, then_by_view, then_by_point = then.project_with_jacobians(places)
+    _, then_by_view, then_by_point = project_with_jacobians(then, places)
     ground_by_key = -np.linalg.solve(then_by_point[:, :, :2], then_by_view)
     image_by_key = by_point[:, :, :2] @ ground_by_key
     image_by_key[:, :, LENS] += by_view[:, :, LENS]

@@ -8,7 +8,7 @@ import numpy as np
 
 from standoff.core.camera import CameraPrior
 from standoff.core.homography import FloatArray
-from standoff.core.types import ImageArray
+from standoff.core.types import ImageArray, Luma
 from standoff.stages.ground.shape import ReferenceShape
 from standoff.stages.ground.solid_fit import Belief, fit_solid
 from standoff.stages.ground.solid_search import Found, HeightPrior, search_solid
@@ -38,11 +38,11 @@ def found_with_another_lens(
     return _contradiction(found.belief(), camera) if isinstance(found, Found) else ""
 
 
-def refitted_lens(gray: ImageArray, shape: ReferenceShape, found: Belief, camera: CameraPrior) -> tuple[Belief, str]:
+def refitted_lens(gray: Luma, shape: ReferenceShape, found: Belief, camera: CameraPrior) -> tuple[Belief, str]:
     """Fit a reference that was found by a stated lens again with a free focal length.
 
     Args:
-        gray: (H, W).
+        gray: The picture.
         shape: Of the reference.
         found: By the stated lens.
         camera: That lens.

@@ -55,6 +55,16 @@ def map_from_view(
     )
 
 
+_TURNS = np.array(
+    [
+        [[0.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]],
+        [[0.0, 0.0, 1.0], [0.0, 0.0, 0.0], [-1.0, 0.0, 0.0]],
+        [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]],
+    ]
+)
+"""(3, 3, 3) what turns about the camera's axes do to a point of its frame, a radian each: axis x point."""
+
+
 def _entries_with_jacobian(view: View) -> tuple[FloatArray, FloatArray]:
     """Return the signed map from undistorted pixels to the ground, at unit norm, and its derivative by the view.
 
@@ -66,9 +76,8 @@ def _entries_with_jacobian(view: View) -> tuple[FloatArray, FloatArray]:
     camera = view.camera.matrix
     to_camera = np.linalg.solve(camera, forth)
     by_forth = np.zeros((CHANGES, 3, 3))
-    for k, axis in enumerate(np.eye(3)):
-        by_forth[k] = camera @ np.cross(axis, to_camera, axisb=0).T
-        by_forth[3 + k, :, 2] = -camera @ view.site_to_camera[:, k]
+    by_forth[:3] = camera @ (_TURNS @ to_camera)
+    by_forth[3:6, :, 2] = -(camera @ view.site_to_camera).T
     by_forth[6, :2] = np.diag(camera)[:2, None] * to_camera[:2]
     # The inverse moves by -back d(forth) back; of that only what is across the entries' own direction keeps the norm.
     slopes = -(back @ by_forth @ back).reshape(CHANGES, 9)

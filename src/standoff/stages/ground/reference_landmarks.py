@@ -82,7 +82,7 @@ class ReferenceLandmarks:
     def _look_at(self, solid: SolidObserver, moment: Moment, belief: CameraBelief) -> str:
         now, time_s = belief.now, moment.frame.time_s
         if now is not None and belief.by_landmark:
-            seen = solid.look(moment.gray, now, held=moment.held, keeps_height=_keeps_height(solid, belief))
+            seen = solid.look(moment.luma, now, held=moment.held, keeps_height=_keeps_height(solid, belief))
             if seen is not None:
                 _take(solid, seen, moment, belief)
                 return ""
@@ -117,7 +117,7 @@ class ReferenceLandmarks:
             belief.warnings.setdefault("lens", f"{text} ({moment.text})")
 
     def _begin(self, solid: SolidObserver, own: Belief, moment: Moment, belief: CameraBelief) -> None:
-        own, text = refitted_lens(moment.gray, solid.reference.shape, own, belief.lens)
+        own, text = refitted_lens(moment.luma, solid.reference.shape, own, belief.lens)
         if text:
             belief.warnings.setdefault("lens", f"{text} ({moment.text})")
             belief.doubt_lens(own.state.view.camera)
@@ -169,7 +169,7 @@ def _join(solid: SolidObserver, own: Belief, moment: Moment, belief: CameraBelie
             solid.remember_height(now)
         solid.stands(placement)
     keeps_height = _keeps_height(solid, belief)
-    seen = solid.look(moment.gray, now, held=True, keeps_height=keeps_height, found=own.state)
+    seen = solid.look(moment.luma, now, held=True, keeps_height=keeps_height, found=own.state)
     if seen is not None:
         _take(solid, seen, moment, belief)
     return ""

@@ -9,6 +9,7 @@ import numpy as np
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.pose import CHANGES, View
 from standoff.core.types import IntArray
+from standoff.stages.ground.projection import project
 from standoff.stages.ground.shape import ReferenceShape
 
 STATE = CHANGES + 1
@@ -135,7 +136,7 @@ def _strip_widths_px(shape: ReferenceShape, state: SolidState) -> FloatArray:
     height_m = state.height_m
     ends_m = [(corners, height_m), (following, height_m), (middle, height_m), (middle, 0.0)]
     places = np.concatenate([np.column_stack([xy, np.full(len(xy), z)]) for xy, z in ends_m])
-    start, end, high, low = state.view.project(places).reshape(4, len(corners), 2)
+    start, end, high, low = project(state.view, places).reshape(4, len(corners), 2)
     along = end - start
     with np.errstate(invalid="ignore", divide="ignore"):
         across = np.column_stack([-along[:, 1], along[:, 0]]) / np.linalg.norm(along, axis=1)[:, None]
@@ -146,7 +147,7 @@ def sample_edges(shape: ReferenceShape, state: SolidState) -> EdgeSamples:
     """Put points on the visible edges, evenly in the picture, away from the corners."""
     edges, doubt_px, lower_side = visible_edges(shape, state)
     scale = np.array([1.0, 1.0, state.height_m])
-    ends_px = state.view.project((edges * scale).reshape(-1, 3)).reshape(-1, 2, 2)
+    ends_px = project(state.view, (edges * scale).reshape(-1, 3)).reshape(-1, 2, 2)
     along = ends_px[:, 1] - ends_px[:, 0]
     length_px = np.linalg.norm(along, axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -160,9 +161,9 @@ def sample_edges(shape: ReferenceShape, state: SolidState) -> EdgeSamples:
     places = edges[edge, 0] + share[:, None] * (edges[edge, 1] - edges[edge, 0])
     return EdgeSamples(
         xy_m=places[:, :2],
-        z_share=places[:, 2],
+        z_share=places[:, 2].copy(),
         edge=edge,
-        points_px=state.view.project(places * scale),
+        points_px=project(state.view, places * scale),
         normal=normal[edge],
         reach_px=_free_reach(ends_px, normal, edges[:, 0, 2] == edges[:, 1, 2])[edge],
         length_px=np.where(usable, length_px, 0.0),

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from standoff.core.homography import BoolArray, FloatArray
-from standoff.core.types import ImageArray
+from standoff.core.types import Luma
 from standoff.stages.ground.compiled import compiled
 from standoff.stages.ground.edges import interpolated
 from standoff.stages.ground.solid import EdgeSamples
@@ -49,20 +49,16 @@ class Blurred:
         values: (H, W) grey levels.
         left_px: Picture column of `values[:, 0]`.
         top_px: Picture row of `values[0]`.
+        least_steepness: Grey levels a pixel below which an edge is not told from the texture of the ground.
     """
 
     values: Smooth
     left_px: int
     top_px: int
-
-    @property
-    def least_steepness(self) -> float:
-        """Grey levels a pixel below which an edge is not told from the texture of the ground."""
-        steps = np.abs(self.values[::2, 1::2] - self.values[::2, :-1:2][:, : self.values[::2, 1::2].shape[1]])
-        return max(_LEAST_STEEPNESS, _NOISE_FACTOR * float(np.median(steps)))
+    least_steepness: float
 
     @classmethod
-    def around(cls, gray: ImageArray, points_px: FloatArray, margin_px: float) -> Blurred | None:
+    def around(cls, gray: Luma, points_px: FloatArray, margin_px: float) -> Blurred | None:
         """Smooth what lies around points (N, 2), or return None where next to nothing of it is in the picture."""
         height, width = gray.shape
         low = np.floor(points_px.min(axis=0) - margin_px).astype(int) - _MARGIN_PX
@@ -71,7 +67,13 @@ class Blurred:
         if x1 - x0 < _MARGIN_PX or y1 - y0 < _MARGIN_PX:
             return None
         crop = gray[y0:y1, x0:x1].astype(np.float32)
-        return cls(cv2.GaussianBlur(crop, (7, 7), 1.0, borderType=cv2.BORDER_REPLICATE), int(x0), int(y0))
+        smooth = cv2.GaussianBlur(crop, (7, 7), 1.0, borderType=cv2.BORDER_REPLICATE)
+        return cls(smooth, int(x0), int(y0), _least_steepness(smooth))
+
+
+def _least_steepness(smooth: Smooth) -> float:
+    brighter, darker = smooth[::2, 1::2], smooth[::2, :-1:2]
+    return max(_LEAST_STEEPNESS, _NOISE_FACTOR * float(np.median(cv2.absdiff(brighter, darker))))
 
 
 def look_across(picture: Blurred, samples: EdgeSamples, half_px: float) -> Looks:

@@ -7,35 +7,27 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from standoff.core.homography import BoolArray, FloatArray
-from standoff.core.pose import CHANGES
-from standoff.core.types import ImageArray, IntArray
-from standoff.stages.ground.lines import TUKEY
+from standoff.core.types import IntArray, Luma
+from standoff.stages.ground.projection import project, project_with_jacobians
 from standoff.stages.ground.shape import ReferenceShape
-from standoff.stages.ground.solid import HEIGHT, STATE, EdgeSamples, SolidState, sample_edges
+from standoff.stages.ground.solid import EdgeSamples, SolidState, sample_edges
 from standoff.stages.ground.solid_edges import Blurred, Looks, look_across
+from standoff.stages.ground.solid_rounds import choose_edges, edge_medians, expect_edges, normal_equations, weigh
 
-_ROUNDS, _SETTLED = 6, 4
-_LEAST_GATE_PX = 2.0
+_ROUNDS, _SETTLED_ROUNDS = 4, 2
+_STILL_PX = 0.01
+"""A round that moves no sample by more than this is the last: what is left is a fraction of it."""
+
+_LEAST_GATE_PX, _GATE_SHRINKS, _GATE_MOVES = 2.0, 0.6, 4.0
+"""Edges are looked for within a gate: that of the round before, smaller, or so many times what that round moved."""
+
 _SUPPORT_PX = 0.7
-_MIN_SCATTER_PX = 0.15
-_CORRELATED = 6.0
-"""Samples next to each other share blur, stains and shadows: so many count as one independent observation."""
-
-_EDGE_SIGMA_PX = 0.12
-"""No edge is known better than this, whatever its samples' scatter: lens blur, shading and compression pull it."""
-
-_PATCHY_PX = 4.0
-"""An edge of which hardly anything agrees may be something else's, off by about so much; one that is whole is not."""
-
 _WORTH_SETTLING_PX, _DOUBT_LEFT = 0.2, 0.5
 """A narrow side's doubt of less than this is not worth a decision, and after one so much of it remains."""
 
 _STRIP_BLUR_PX, _STRIP_SHARE, _STRIP_RATIO, _STRIP_DOUBT = 2.5, 0.6, 0.3, 0.35
 """A strip: two edges this near to each other along so much of the length, the fainter one with so much of the other's
 steepness. Sharpening makes such pairs, too, but fainter ones."""
-
-_LEAST_SHARE = 0.35
-"""An edge of which less than this share is found contributes nothing: what was found is something else."""
 
 _MIN_SAMPLES = 12
 _MAX_CHANGE = np.array([0.3, 0.3, 0.3, 20.0, 20.0, 20.0, 0.7, 0.3, 1.0])
@@ -99,7 +91,7 @@ def side_support(support: FloatArray, lower_side: IntArray, count: int) -> Float
 
 
 def fit_solid(
-    gray: ImageArray, shape: ReferenceShape, prior: Belief, half_px: float, start: SolidState | None = None
+    gray: Luma, shape: ReferenceShape, prior: Belief, half_px: float, start: SolidState | None = None
 ) -> SolidFit | None:
     """Fit a state to the edges of a picture.
 
@@ -122,36 +114,67 @@ def fit_solid(
     if picture is None:
         return None
     looks = look_across(picture, samples, half_px)
-    gate_px = half_px
-    for stage in range(_ROUNDS):
-        if stage == _SETTLED:
-            samples = _settled(samples, looks, state)
-        change = _step(samples, looks, state, prior, gate_px)
-        if change is None:
+    moved = _moved(samples, looks, prior, _Place(state, half_px), _ROUNDS)
+    if moved is None:
+        return None
+    settled = _settled(samples, looks, moved.state)
+    if settled is not samples or not moved.still:
+        moved = _moved(settled, looks, prior, moved, _SETTLED_ROUNDS)
+    return None if moved is None else _finished(settled, looks, moved.state)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Place:
+    """Where a fit is between two rounds.
+
+    Attributes:
+        state: The best so far.
+        gate_px: How far from it the picture's edges may lie in the next round.
+        still: Whether the last round moved next to nothing.
+    """
+
+    state: SolidState
+    gate_px: float
+    still: bool = False
+
+
+def _moved(samples: EdgeSamples, looks: Looks, prior: Belief, place: _Place, rounds: int) -> _Place | None:
+    """Go so many rounds, fewer where nothing moves any more; None where there is too little to fit to."""
+    for _ in range(rounds):
+        step = _step(samples, looks, place, prior)
+        if step is None:
             return None
-        state = state.changed(np.clip(change, -_MAX_CHANGE, _MAX_CHANGE))
-        gate_px = max(gate_px * 0.6, _LEAST_GATE_PX)
-    return _finished(samples, looks, state)
+        change, moved_px = step
+        gate_px = max(min(_GATE_SHRINKS * place.gate_px, _GATE_MOVES * moved_px), _LEAST_GATE_PX)
+        still = place.gate_px <= _LEAST_GATE_PX and moved_px <= _STILL_PX
+        place = _Place(place.state.changed(change), gate_px, still)
+        if still:
+            break
+    return place
 
 
 def outline_support(picture: Blurred, shape: ReferenceShape, state: SolidState) -> tuple[EdgeSamples, FloatArray]:
     """Return a state's visible edges, and (E,) the share of each that a picture supports, without fitting anything."""
     samples = sample_edges(shape, state)
     samples, looks = _paired(samples, look_across(picture, samples, _LEAST_GATE_PX))
-    residual, _, found = _associated(samples, looks, state, _LEAST_GATE_PX)
+    residual, found, _ = _associated(samples, looks, state, _LEAST_GATE_PX)
     return samples, _support(samples, looks, residual, found)
 
 
-def _step(samples: EdgeSamples, looks: Looks, state: SolidState, prior: Belief, gate_px: float) -> FloatArray | None:
-    """Return the change (9,) that one round of the fit finds, or None if there is too little to fit to."""
-    residual, jacobian, found = _associated(samples, looks, state, gate_px)
-    weight, scatter_px = _weights(samples, looks, residual, found)
-    if (weight > 0).sum() < _MIN_SAMPLES:
+def _step(samples: EdgeSamples, looks: Looks, place: _Place, prior: Belief) -> tuple[FloatArray, float] | None:
+    """Return the change (9,) that one round finds, and how far it moves a sample; None if too little is there."""
+    residual, found, jacobian = _associated(samples, looks, place.state, place.gate_px)
+    weight, scatter_px = weigh(residual, found, looks.inside, samples.edge, samples.doubt_px)
+    believed = weight > 0.0
+    if np.count_nonzero(believed) < _MIN_SAMPLES:
         return None
-    information, pull = _normal_equations(samples, jacobian, residual, weight, scatter_px)
-    pull -= prior.information @ state.change_from(prior.state)
+    information, pull = normal_equations(jacobian, residual, weight, scatter_px, samples.edge, samples.doubt_px)
+    pull -= prior.information @ place.state.change_from(prior.state)
     change = np.asarray(np.linalg.solve(information + prior.information, pull), dtype=np.float64)
-    return change if np.isfinite(change).all() else None
+    if not np.isfinite(change).all():
+        return None
+    change = np.clip(change, -_MAX_CHANGE, _MAX_CHANGE)
+    return change, float(np.abs(jacobian[believed] @ change).max())
 
 
 def _paired(samples: EdgeSamples, looks: Looks) -> tuple[EdgeSamples, Looks]:
@@ -182,16 +205,23 @@ def _paired(samples: EdgeSamples, looks: Looks) -> tuple[EdgeSamples, Looks]:
 
 
 def _settled(samples: EdgeSamples, looks: Looks, state: SolidState) -> EdgeSamples:
-    """Decide for each narrow side, once the other edges have fixed the state, whether its upper or lower edge shows."""
-    residual, _, found = _associated(samples, looks, state, _LEAST_GATE_PX + float(samples.doubt_px.max(initial=0.0)))
-    offset_px = _medians(residual, found, samples)
+    """Decide for each narrow side, once the other edges have fixed the state, whether its upper or lower edge shows.
+
+    Returns:
+        The very samples where there is nothing to decide.
+    """
+    narrow = np.flatnonzero((samples.doubt_px > _WORTH_SETTLING_PX) & (samples.length_px > 0))
+    if not len(narrow):
+        return samples
+    residual, found, _ = _associated(samples, looks, state, _LEAST_GATE_PX + float(samples.doubt_px.max(initial=0.0)))
+    offset_px = edge_medians(residual, found, samples.edge, len(samples.length_px))
     z_share, doubt_px = samples.z_share.copy(), samples.doubt_px.copy()
-    expected = state.view.project(samples.points_m(state.height_m))
-    for edge in np.flatnonzero((samples.doubt_px > _WORTH_SETTLING_PX) & (samples.length_px > 0)):
+    expected = project(state.view, samples.points_m(state.height_m))
+    for edge in narrow:
         mine = samples.edge == edge
         for share in (0.0, 1.0):
             places = np.column_stack([samples.xy_m[mine], np.full(mine.sum(), share * state.height_m)])
-            moved = ((state.view.project(places) - expected[mine]) * samples.normal[mine]).sum(axis=1)
+            moved = ((project(state.view, places) - expected[mine]) * samples.normal[mine]).sum(axis=1)
             if abs(offset_px[edge] - np.median(moved)) < samples.doubt_px[edge] / 2.0:
                 z_share[mine] = share
                 doubt_px[edge] *= _DOUBT_LEFT
@@ -199,100 +229,32 @@ def _settled(samples: EdgeSamples, looks: Looks, state: SolidState) -> EdgeSampl
 
 
 def _finished(samples: EdgeSamples, looks: Looks, state: SolidState) -> SolidFit | None:
-    residual, jacobian, found = _associated(samples, looks, state, _LEAST_GATE_PX)
-    weight, scatter_px = _weights(samples, looks, residual, found)
+    residual, found, jacobian = _associated(samples, looks, state, _LEAST_GATE_PX)
+    weight, scatter_px = weigh(residual, found, looks.inside, samples.edge, samples.doubt_px)
     support = _support(samples, looks, residual, found)
-    information, _ = _normal_equations(samples, jacobian, residual, weight, scatter_px)
+    information, _ = normal_equations(jacobian, residual, weight, scatter_px, samples.edge, samples.doubt_px)
     if not np.isfinite(information).all():
         return None
     return SolidFit(state, information, support, samples.length_px, samples.lower_side, scatter_px)
 
 
-def _normal_equations(
-    samples: EdgeSamples, jacobian: FloatArray, residual: FloatArray, weight: FloatArray, scatter_px: float
-) -> tuple[FloatArray, FloatArray]:
-    """Return what all edges say (9, 9) and where they pull (9,), each edge's error as a whole included.
-
-    The covariance of one edge's samples is that of independent errors plus one offset that all of them share; its
-    inverse is Woodbury's.
-    """
-    count = len(samples.length_px)
-    root = np.sqrt(weight / (scatter_px**2 * _CORRELATED))
-    rows, values = jacobian * root[:, None], residual * root
-    shared, pulls, total = np.zeros((count, STATE)), np.zeros(count), np.zeros(count)
-    np.add.at(shared, samples.edge, rows * root[:, None])
-    np.add.at(pulls, samples.edge, values * root)
-    np.add.at(total, samples.edge, root**2)
-    agreeing = np.bincount(samples.edge, weight > 0, count) / np.maximum(np.bincount(samples.edge, minlength=count), 1)
-    patchy_px = _PATCHY_PX * (1.0 - agreeing) ** 2
-    shrink = 1.0 / (1.0 / (_EDGE_SIGMA_PX**2 + samples.doubt_px**2 + patchy_px**2) + total)
-    information: FloatArray = rows.T @ rows - (shared * shrink[:, None]).T @ shared
-    pull: FloatArray = rows.T @ values - shared.T @ (shrink * pulls)
-    return information, pull
-
-
 def _associated(
     samples: EdgeSamples, looks: Looks, state: SolidState, gate_px: float
-) -> tuple[FloatArray, FloatArray, BoolArray]:
+) -> tuple[FloatArray, BoolArray, FloatArray]:
     """Choose an edge of the picture for each sample.
 
     Returns:
-        (N,) distance from the state's edge to the chosen one along the normal, 0 where there is none; (N, 9) how the
-        state's edge moves along the normal; (N,) whether there is one.
+        (N,) distance from the state's edge to the chosen one along the normal, 0 where there is none; (N,) whether
+        there is one; (N, 9) how the state's edge moves along the normal.
     """
-    points_px, by_view, by_point = state.view.project_with_jacobians(samples.points_m(state.height_m))
-    by_height = by_point[:, :, 2] * samples.z_share[:, None]
-    jacobian = np.empty((len(samples), STATE))
-    jacobian[:, :CHANGES] = np.einsum("ni,nij->nj", samples.normal, by_view)
-    jacobian[:, HEIGHT] = (samples.normal * by_height).sum(axis=1)
-    expected = ((points_px - samples.points_px) * samples.normal).sum(axis=1)
-    distance = looks.offset_px - expected[:, None]
-    nearness = np.abs(looks.steepness) * np.exp(-0.5 * (distance / (0.5 * gate_px)) ** 2)
-    nearness[~(np.abs(distance) <= gate_px)] = 0.0
-    # All of one edge has its bright side on the same side.
-    signed = np.zeros(len(samples.length_px))
-    best = nearness.argmax(axis=1)
-    rows = np.arange(len(samples))
-    np.add.at(signed, samples.edge, np.sign(looks.steepness[rows, best]) * nearness[rows, best])
-    polarity = np.sign(signed)[samples.edge]
-    nearness[np.sign(looks.steepness) != polarity[:, None]] = 0.0
-    best = nearness.argmax(axis=1)
-    chosen = nearness[rows, best] > 0
-    return np.where(chosen, distance[rows, best], 0.0), jacobian, chosen
-
-
-def _medians(residual: FloatArray, found: BoolArray, samples: EdgeSamples) -> FloatArray:
-    """Return (E,) the median residual of each edge; 0 where nothing was found."""
-    edge, residual = samples.edge[found], residual[found]
-    ordered = residual[np.lexsort((residual, edge))]
-    counts = np.bincount(edge, minlength=len(samples.length_px))
-    there = np.flatnonzero(counts)
-    first = (np.cumsum(counts) - counts)[there]
-    medians = np.zeros(len(counts))
-    medians[there] = (ordered[first + (counts[there] - 1) // 2] + ordered[first + counts[there] // 2]) / 2.0
-    return medians
-
-
-def _weights(samples: EdgeSamples, looks: Looks, residual: FloatArray, found: BoolArray) -> tuple[FloatArray, float]:
-    """Return Tukey's weights (N,), 0 where nothing is believed, and the scatter in px that they rest on.
-
-    A doubtful edge may be off as a whole; what counts is how its samples scatter about itself.
-    """
-    if not found.any():
-        return np.zeros(len(residual)), _MIN_SCATTER_PX
-    allowed = 2.0 * samples.doubt_px
-    centre = np.clip(_medians(residual, found, samples), -allowed, allowed)
-    residual = residual - centre[samples.edge]
-    scatter_px = max(1.4826 * float(np.median(np.abs(residual[found]))), _MIN_SCATTER_PX)
-    weight: FloatArray = np.maximum(1.0 - (residual / (TUKEY * scatter_px)) ** 2, 0.0) ** 2 * found
-    return weight * _believed(samples, looks, weight), scatter_px
-
-
-def _believed(samples: EdgeSamples, looks: Looks, weight: FloatArray) -> BoolArray:
-    """Return (N,) which samples lie on edges of which enough was found: a shadow that crosses one is no edge."""
+    moved_px, jacobian = expect_edges(
+        *project_with_jacobians(state.view, samples.points_m(state.height_m)),
+        samples.points_px,
+        samples.normal,
+        samples.z_share,
+    )
     count = len(samples.length_px)
-    agreeing = np.bincount(samples.edge, weight > 0, count)
-    return np.asarray((agreeing >= _LEAST_SHARE * np.bincount(samples.edge, looks.inside, count))[samples.edge])
+    return *choose_edges(moved_px, samples.edge, count, looks.offset_px, looks.steepness, gate_px), jacobian
 
 
 def _support(samples: EdgeSamples, looks: Looks, residual: FloatArray, found: BoolArray) -> FloatArray:

@@ -11,10 +11,11 @@ import numpy as np
 from standoff.core.camera import CameraPrior
 from standoff.core.homography import FloatArray
 from standoff.core.pose import View
-from standoff.core.types import Detections, ImageArray, NoGroundMap
+from standoff.core.types import Detections, ImageArray, Luma, NoGroundMap
 from standoff.stages.ground.params import ReferenceParams
 from standoff.stages.ground.placement import Placement, Through
 from standoff.stages.ground.pose_filter import Estimate
+from standoff.stages.ground.projection import project, project_with_jacobians
 from standoff.stages.ground.shape import ReferenceShape
 from standoff.stages.ground.solid import HEIGHT, SolidState
 from standoff.stages.ground.solid_fit import Belief, fit_solid
@@ -127,7 +128,7 @@ class SolidObserver:
 
     def look(
         self,
-        gray: ImageArray,
+        gray: Luma,
         now: Estimate,
         *,
         held: bool,
@@ -137,7 +138,7 @@ class SolidObserver:
         """Look for it where it should be.
 
         Args:
-            gray: (H, W).
+            gray: The picture.
             now: What is believed of the camera on the site.
             held: Whether motion or another thing tells where the camera is in this frame.
             keeps_height: Whether the belief's height is this reference's.
@@ -264,7 +265,7 @@ class SolidObserver:
 
     def outline_px(self, own: SolidState) -> FloatArray:
         """Return (N, 2) the upper corners in the picture."""
-        return own.view.project(self._corners_m(own))
+        return project(own.view, self._corners_m(own))
 
     def straight_outline_px(self, view: View, height_m: float) -> FloatArray:
         """Return (N, 2) the upper corners, without lens distortion, in a view of its own frame."""
@@ -287,7 +288,7 @@ class SolidObserver:
 
     def _outline_sigma_px(self, own: SolidState, covariance: FloatArray) -> float:
         """Return the standard error of where the upper corners should be, the worst of them."""
-        _, by_view, by_point = own.view.project_with_jacobians(self._corners_m(own))
+        _, by_view, by_point = project_with_jacobians(own.view, self._corners_m(own))
         jacobian = np.concatenate([by_view, by_point[:, :, 2:]], axis=2)
         variance = np.einsum("nij,jk,nik->ni", jacobian, covariance, jacobian)
         return float(np.sqrt(variance.max())) if np.isfinite(variance).all() else np.inf

@@ -28,8 +28,10 @@ TURNED_BACK = "the clock went backwards"
 TOO_LITTLE = "too little to follow"
 _NAMED = (CUT, ZOOMED, RESIZED, TURNED_BACK)
 
-_NEAR_LEVELS = 1
-_FAR_LEVELS = 4
+_NEAREST_LEVELS, _NEAR_LEVELS, _FAR_LEVELS = 0, 1, 4
+_NEAREST_PX = 1.0
+"""Where the last picture's points were this near to where they were looked for, the next one's will be near enough."""
+
 _NOISE_STEP = 0.1
 _LONGEST_STEP = 3.0
 """Times the last step that a gap may be filled with: beyond that it is a guess, and a look around is better."""
@@ -142,7 +144,7 @@ class MotionEstimator:
             return self._lost(picture, movers_px)
         step, elapsed_s = match.plane.matrix @ homography.invert(self._pose), picture.time_s - self._pose_s
         self._movers.carry(step)
-        self._step, self._step_s = step, elapsed_s
+        self._step, self._step_s, self._surprise_px = step, elapsed_s, match.surprise_px
         if self._zoom.zooms(step, elapsed_s, picture.size_px):
             self._begin(picture, movers_px)
             return NoCameraMotion(ZOOMED)
@@ -173,7 +175,8 @@ class MotionEstimator:
         ratio = elapsed_s / self._step_s if self._step_s > 0.0 else 1.0
         step = self._step if ratio <= _LONGEST_STEP else None
         expected = key.expect(self._pose, step, ratio)
-        match = key.find(picture, expected, movers_px, _NEAR_LEVELS) if step is not None else None
+        near = _NEAREST_LEVELS if self._surprise_px <= _NEAREST_PX else _NEAR_LEVELS
+        match = key.find(picture, expected, movers_px, near) if step is not None else None
         match = match or key.find(picture, expected, movers_px, _FAR_LEVELS)
         before = self._before
         if match is not None or before is None or before is key.picture or before.time_s != self._pose_s:
@@ -211,4 +214,5 @@ class MotionEstimator:
     def _forget_step(self) -> None:
         self._step = None
         self._step_s = 0.0
+        self._surprise_px = np.inf
         self._zoom.reset()

@@ -37,12 +37,14 @@ class Match:
         inliers: How many of those move with the ground.
         noise_px: Standard error of a point along an axis by how the residuals changed since the picture before; NaN
             where it is not known.
+        surprise_px: How far the points of the ground were from where they were looked for, the median; followed px.
     """
 
     plane: PlaneMotion
     in_view: int
     inliers: int
     noise_px: float
+    surprise_px: float
 
 
 @dataclass(slots=True, eq=False)
@@ -104,7 +106,7 @@ class Keyframe:
             picture: Of the same size.
             expected: (N, 2) where its points may be, frame pixels without distortion; see `expect`.
             movers_px: (M, 4) boxes in frame pixels in which nothing is ground.
-            levels: How often the pictures are halved: 1 where the expectation is good.
+            levels: How often the pictures are halved: not at all where the expectation is good.
 
         Returns:
             None where too few points move alike.
@@ -141,7 +143,8 @@ class Keyframe:
         good &= ~inside(target, movers_px)
         target = self._lens.undistorted(target)
         good &= np.isfinite(target).all(axis=1)
-        return self._agreed(points, picture, np.flatnonzero(seen)[good], target[good], int(seen.sum()))
+        off_px = np.linalg.norm(end_px - picture.to_small(start_px[seen]), axis=1)[good]
+        return self._agreed(points, picture, np.flatnonzero(seen)[good], target[good], off_px, int(seen.sum()))
 
     def expect(self, pose: FloatArray, step: FloatArray | None, ratio: float) -> FloatArray:
         """Return (N, 2) where the points should be: where they were last, and on by a share of the last step.
@@ -181,7 +184,13 @@ class Keyframe:
         )
 
     def _agreed(
-        self, points: _Points, picture: FollowedPicture, which: IntArray, target: FloatArray, in_view: int
+        self,
+        points: _Points,
+        picture: FollowedPicture,
+        which: IntArray,
+        target: FloatArray,
+        off_px: FloatArray,
+        in_view: int,
     ) -> Match | None:
         """Return what most of the points `which` (K,) tell, found at `target` (K, 2) without distortion."""
         params, scale = self._params, float(picture.full_per_small.mean())
@@ -203,7 +212,7 @@ class Keyframe:
         changed = (plane.residual_px - points.residual_px[which])[plane.inlier]
         points.residual_px[:] = np.nan
         points.residual_px[which] = plane.residual_px
-        return Match(plane, in_view, inliers, _noise_px(changed))
+        return Match(plane, in_view, inliers, _noise_px(changed), float(np.median(off_px[plane.inlier])))
 
     def _in_view(self, picture: FollowedPicture, start_px: FloatArray, movers_px: FloatArray) -> BoolArray:
         edge = self._params.window_px / 2.0

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from standoff.core.homography import FloatArray
-from standoff.core.types import Frame, ImageArray
+from standoff.core.types import Frame, ImageArray, Picture
 
 _THUMBNAIL_PX = (48, 27)
 _BLANK_LEVELS = 1.5
@@ -22,19 +22,16 @@ _MIN_CORNER = 2e-5
 """OpenCV's smaller eigenvalue, a block of 5, at half the followed size: slopes of about half a level a pixel."""
 
 
-def _shrunk(gray: ImageArray, width_px: int) -> tuple[ImageArray, FloatArray]:
+def _shrunk(picture: Picture, width_px: int) -> tuple[ImageArray, FloatArray]:
     """Shrink to about the width, halving first: only that has a quick path, and only large steps alias.
 
-    An odd last row or column is dropped by halving, so that all pixels have the same size.
-
     Returns:
-        The small picture, and (2,) how many of the given pixels make one of it, along x and y.
+        The small luma, and (2,) how many of the picture's pixels make one of it, along x and y.
     """
-    per_small = np.ones(2)
-    while gray.shape[1] >= 1.5 * width_px:
-        even = gray[: gray.shape[0] // 2 * 2, : gray.shape[1] // 2 * 2]
-        gray = cv2.resize(even, (even.shape[1] // 2, even.shape[0] // 2), interpolation=cv2.INTER_AREA)
-        per_small *= 2.0
+    times = 0
+    while picture.width_px >> times >= 1.5 * width_px:
+        times += 1
+    gray, per_small = picture.halved_gray(times), np.full(2, 2.0**times)
     if gray.shape[1] > width_px:
         height_px = max(round(gray.shape[0] * width_px / gray.shape[1]), 1)
         per_small *= np.array([gray.shape[1] / width_px, gray.shape[0] / height_px])
@@ -61,7 +58,7 @@ class FollowedPicture:
     @classmethod
     def of(cls, frame: Frame, width_px: int) -> FollowedPicture:
         """Shrink a frame's luma to about a width."""
-        gray, full_per_small = _shrunk(frame.picture.gray(), width_px)
+        gray, full_per_small = _shrunk(frame.picture, width_px)
         return cls(frame.time_s, frame.size_px, gray, full_per_small)
 
     def to_full(self, small_px: FloatArray) -> FloatArray:

@@ -1,0 +1,127 @@
+"""What a `View` projects, compiled: of some hundred points at most, where numpy takes longer to begin than to work.
+
+The formulas are those of `standoff.core.pose` and `standoff.core.camera`, which must do without a compiler; a test
+holds the two together.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from standoff.core.homography import FloatArray
+from standoff.core.pose import CHANGES, View
+from standoff.stages.ground.compiled import compiled
+
+
+def project(view: View, points_m: FloatArray) -> FloatArray:
+    """Show where points of the site appear, as `View.project`.
+
+    Args:
+        view: The camera.
+        points_m: (N, 3), site frame.
+
+    Returns:
+        (N, 2) pixels, in or outside the picture; NaN behind the camera or outside the lens model.
+    """
+    camera = view.camera
+    lens = camera.matrix, camera.distortion, camera.first_fold_r2()
+    return _seen(np.ascontiguousarray(points_m), view.position_m, view.site_to_camera, *lens)
+
+
+def project_with_jacobians(view: View, points_m: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Project points, and say how their pictures move, as `View.project_with_jacobians`.
+
+    Args:
+        view: The camera.
+        points_m: (N, 3), site frame.
+
+    Returns:
+        (N, 2) pixels as seen in the picture; (N, 2, 8) their derivative by a change of the view; (N, 2, 3) by the
+        points; NaN behind the camera.
+    """
+    return _projected(
+        np.ascontiguousarray(points_m), view.position_m, view.site_to_camera, view.camera.matrix, view.camera.distortion
+    )
+
+
+@compiled
+def _seen(
+    points_m: FloatArray,
+    position_m: FloatArray,
+    rotation: FloatArray,
+    matrix: FloatArray,
+    distortion: FloatArray,
+    first_fold_r2: float,
+) -> FloatArray:
+    pixels = np.full((len(points_m), 2), np.nan)
+    in_camera, bent, slope = np.empty(3), np.empty(2), np.empty((2, 2))
+    for n in range(len(points_m)):
+        _to_camera(points_m[n], position_m, rotation, in_camera)
+        if not in_camera[2] > 0.0:
+            continue
+        x, y = in_camera[0] / in_camera[2], in_camera[1] / in_camera[2]
+        _bend(x, y, distortion, bent, slope)
+        determinant = slope[0, 0] * slope[1, 1] - slope[0, 1] * slope[1, 0]
+        if determinant > 0.0 and slope[0, 0] + slope[1, 1] > 0.0 and x * x + y * y < first_fold_r2:
+            for axis in range(2):
+                pixels[n, axis] = matrix[axis, axis] * bent[axis] + matrix[axis, 2]
+    return pixels
+
+
+@compiled
+def _projected(
+    points_m: FloatArray,
+    position_m: FloatArray,
+    rotation: FloatArray,
+    matrix: FloatArray,
+    distortion: FloatArray,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    count = len(points_m)
+    pixels, by_view, by_point = np.empty((count, 2)), np.empty((count, 2, CHANGES)), np.empty((count, 2, 3))
+    in_camera, bent, slope, by_camera = np.empty(3), np.empty(2), np.empty((2, 2)), np.empty(3)
+    for n in range(count):
+        _to_camera(points_m[n], position_m, rotation, in_camera)
+        right, down, depth = in_camera[0], in_camera[1], in_camera[2]
+        if not depth > 0.0:
+            pixels[n], by_view[n], by_point[n] = np.nan, np.nan, np.nan
+            continue
+        x, y = right / depth, down / depth
+        _bend(x, y, distortion, bent, slope)
+        for axis in range(2):
+            focal = matrix[axis, axis]
+            pixels[n, axis] = focal * bent[axis] + matrix[axis, 2]
+            by_camera[0], by_camera[1] = focal * slope[axis, 0] / depth, focal * slope[axis, 1] / depth
+            by_camera[2] = -(by_camera[0] * x + by_camera[1] * y)
+            # A turn w moves a point p of the camera frame by w x p.
+            by_view[n, axis, 0] = by_camera[2] * down - by_camera[1] * depth
+            by_view[n, axis, 1] = by_camera[0] * depth - by_camera[2] * right
+            by_view[n, axis, 2] = by_camera[1] * right - by_camera[0] * down
+            for k in range(3):
+                moved = by_camera[0] * rotation[0, k] + by_camera[1] * rotation[1, k] + by_camera[2] * rotation[2, k]
+                by_point[n, axis, k], by_view[n, axis, 3 + k] = moved, -moved
+            by_view[n, axis, 6] = focal * bent[axis]
+            by_view[n, axis, 7] = focal * (x * x + y * y) * (x if axis == 0 else y)
+    return pixels, by_view, by_point
+
+
+@compiled
+def _to_camera(point_m: FloatArray, position_m: FloatArray, rotation: FloatArray, in_camera: FloatArray) -> None:
+    """Fill in (3,) the point to the right, down and ahead of the camera."""
+    for axis in range(3):
+        in_camera[axis] = 0.0
+        for k in range(3):
+            in_camera[axis] += rotation[axis, k] * (point_m[k] - position_m[k])
+
+
+@compiled
+def _bend(x: float, y: float, distortion: FloatArray, bent: FloatArray, slope: FloatArray) -> None:
+    """Fill in (2,) a direction x / z, y / z as the lens bends it, and (2, 2) the derivative."""
+    k1, k2, p1, p2, k3 = distortion[0], distortion[1], distortion[2], distortion[3], distortion[4]
+    r2 = x * x + y * y
+    radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+    growth = k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3)
+    bent[0] = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)
+    bent[1] = y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y
+    slope[0, 0] = radial + 2.0 * x * x * growth + 2.0 * p1 * y + 6.0 * p2 * x
+    slope[0, 1] = slope[1, 0] = 2.0 * x * y * growth + 2.0 * p1 * x + 2.0 * p2 * y
+    slope[1, 1] = radial + 2.0 * y * y * growth + 6.0 * p1 * y + 2.0 * p2 * x
