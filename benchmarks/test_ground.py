@@ -23,8 +23,7 @@ from standoff.core.pose import View
 from standoff.core.protocols import AnyMotion
 from standoff.core.types import Detections, Frame, ImageArray
 from standoff.stages.frames import AvPicture, Scaler
-from standoff.stages.ground import ReferenceShape
-from standoff.stages.ground.fused import FusedGround
+from standoff.stages.ground import FusedGround, Reference, ReferenceShape
 from standoff.stages.motion import MotionEstimator
 
 SIZES_PX = {"1080p": (1920, 1080), "4K": (3840, 2160)}
@@ -119,7 +118,7 @@ def test_motion(benchmark: BenchmarkFixture, flight: Flight) -> None:
     group(benchmark, flight)
     estimator, frames = MotionEstimator(), flight.frames()
     estimator.update(*next(frames))
-    assert benchmark.pedantic(
+    assert benchmark.pedantic(  # type: ignore[no-untyped-call]
         estimator.update, setup=lambda: (next(frames), {}), rounds=ROUNDS, iterations=1, warmup_rounds=5
     )
 
@@ -134,7 +133,9 @@ def test_ground(benchmark: BenchmarkFixture, flight: Flight) -> None:
         return (frame, found, estimator.update(frame, found)), {}
 
     ground.update(*moved()[0])
-    mapped = benchmark.pedantic(ground.update, setup=moved, rounds=ROUNDS, iterations=1, warmup_rounds=5)
+    mapped = benchmark.pedantic(  # type: ignore[no-untyped-call]
+        ground.update, setup=moved, rounds=ROUNDS, iterations=1, warmup_rounds=5
+    )
     assert mapped and mapped.age_s == 0.0
 
 
@@ -149,4 +150,4 @@ def test_ground_the_first_frame(benchmark: BenchmarkFixture, flight: Flight) -> 
         ground.reset()
         return ground.update(frame, found, motion)
 
-    assert benchmark.pedantic(search, rounds=5, iterations=1, warmup_rounds=1)
+    assert benchmark.pedantic(search, rounds=5, iterations=1, warmup_rounds=1)  # type: ignore[no-untyped-call]

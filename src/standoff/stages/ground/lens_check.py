@@ -8,16 +8,20 @@ import numpy as np
 
 from standoff.core.camera import CameraPrior
 from standoff.core.homography import FloatArray
+from standoff.core.pose import LENS
 from standoff.core.types import ImageArray, Luma
 from standoff.stages.ground.shape import ReferenceShape
 from standoff.stages.ground.solid_fit import Belief, fit_solid
 from standoff.stages.ground.solid_search import Found, HeightPrior, search_solid
 
+_FOCAL = LENS.start
 _STATED_SIGMA, _FREE_SIGMA = 0.03, 0.4
 _LEAST_LOG, _SIGMAS = np.log(1.12), 4.0
 """A focal length so far from the stated one, and so sure, is not the stated one."""
 
-_REACHES_PX = (8.0, 12.0)
+_FIT_PX = 8.0
+_STEP_SIGMA, _STEPS, _SETTLED = 0.08, 8, 2e-3
+"""The focal length goes step by step: all at once, the edges would be lost on the way."""
 
 
 def found_with_another_lens(
@@ -53,20 +57,27 @@ def refitted_lens(gray: Luma, shape: ReferenceShape, found: Belief, camera: Came
     if camera.focal_sigma > _STATED_SIGMA:
         return found, ""
     height_sigma_m = float(np.sqrt(np.linalg.inv(found.information)[-1, -1]))
-    sigma = np.array([1.0] * 3 + [100.0] * 3 + [_FREE_SIGMA, camera.k1_sigma, height_sigma_m])
-    prior = Belief(found.state, np.diag(1.0 / sigma**2))
-    for reach_px in _REACHES_PX:
-        fit = fit_solid(gray, shape, prior, reach_px)
-        if fit is not None:
-            free = Belief(fit.state, prior.information + fit.information)
-            text = _contradiction(free, camera)
-            return (free, text) if text else (found, "")
-    return found, ""
+    sigma = np.array([1.0] * 3 + [100.0] * 3 + [_STEP_SIGMA, camera.k1_sigma, height_sigma_m])
+    free = np.diag(1.0 / sigma**2)
+    state, information = found.state, found.information
+    for _ in range(_STEPS):
+        fit = fit_solid(gray, shape, Belief(state, free), _FIT_PX)
+        if fit is None:
+            return found, ""
+        changed = abs(fit.state.change_from(state)[_FOCAL])
+        state, information = fit.state, fit.information
+        if changed < _SETTLED:
+            break
+    # What is believed of the focal length now comes from the picture alone.
+    free[_FOCAL, _FOCAL] = _FREE_SIGMA**-2
+    refitted = Belief(state, free + information)
+    text = _contradiction(refitted, camera)
+    return (refitted, text) if text else (found, "")
 
 
 def _contradiction(free: Belief, camera: CameraPrior) -> str:
     log_ratio = float(np.log(free.state.view.camera.matrix[0, 0] / camera.camera.matrix[0, 0]))
-    sigma = float(np.sqrt(np.linalg.inv(free.information)[6, 6]))
+    sigma = float(np.sqrt(np.linalg.inv(free.information)[_FOCAL, _FOCAL]))
     if abs(log_ratio) < max(_LEAST_LOG, _SIGMAS * sigma):
         return ""
     return (
