@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from standoff.core.camera import CameraPrior
+from standoff.core.homography import FloatArray
 from standoff.core.pose import CHANGES
 from standoff.core.telemetry import Telemetry
 from standoff.core.types import NoGroundMap
@@ -15,6 +16,9 @@ from standoff.stages.ground.view_prior import in_frame_of, telemetry_view
 
 _MOST_CHI2 = 27.9
 """Five readings (height, pitch, roll, and what they say of the lens) exceed it four times in a hundred thousand."""
+
+_LIKELY_CHI2 = 11.1
+"""They exceed it once in twenty times."""
 
 _NOT_TOLD_DEG = 90.0
 _FREE_LENS = 10.0
@@ -31,14 +35,38 @@ def with_telemetry(belief: Belief, telemetry: Telemetry) -> tuple[Belief, str]:
     Returns:
         The belief, and "" or how the two contradict each other; then the belief is as it was.
     """
+    compared = _compared(belief, telemetry)
+    if compared is None:
+        return belief, ""
+    off, spread = compared
+    before = np.linalg.inv(belief.information)
+    both = before[:CHANGES, :CHANGES] + spread
+    if off @ np.linalg.solve(both, off) > _MOST_CHI2:
+        return belief, _contradiction(belief, telemetry)
+    gain = before[:, :CHANGES] @ np.linalg.inv(both)
+    after = before - gain @ before[:CHANGES]
+    return Belief(belief.state.changed(gain @ off), np.asarray(np.linalg.inv((after + after.T) / 2.0))), ""
+
+
+def agrees_with_telemetry(belief: Belief, telemetry: Telemetry) -> bool:
+    """Return whether telemetry speaks for a belief rather than for another one."""
+    compared = _compared(belief, telemetry)
+    if compared is None:
+        return True
+    off, spread = compared
+    both = np.linalg.inv(belief.information)[:CHANGES, :CHANGES] + spread
+    return bool(off @ np.linalg.solve(both, off) <= _LIKELY_CHI2)
+
+
+def _compared(belief: Belief, telemetry: Telemetry) -> tuple[FloatArray, FloatArray] | None:
+    """Return (8,) the change from a belief to what telemetry says, and (8, 8) its errors; None where it says nothing."""
     view = belief.state.view
-    roll_deg, pitch_deg = float(np.rad2deg(view.roll_rad)), float(np.rad2deg(view.pitch_rad))
     said = telemetry
     if not telemetry.has_attitude:
         said = replace(
             telemetry,
-            pitch_deg=pitch_deg,
-            roll_deg=roll_deg,
+            pitch_deg=float(np.rad2deg(view.pitch_rad)),
+            roll_deg=float(np.rad2deg(view.roll_rad)),
             heading_deg=0.0,
             pitch_sigma_deg=_NOT_TOLD_DEG,
             roll_sigma_deg=_NOT_TOLD_DEG,
@@ -47,21 +75,16 @@ def with_telemetry(belief: Belief, telemetry: Telemetry) -> tuple[Belief, str]:
     lens = CameraPrior(view.camera, _FREE_LENS, _FREE_LENS, "")
     read = telemetry_view(said, said, lens, frame_is_free=True)
     if isinstance(read, NoGroundMap):
-        return belief, ""
+        return None
     told, spread = read
-    before = np.linalg.inv(belief.information)
-    off = in_frame_of(told, view).change_from(view)
-    both = before[:CHANGES, :CHANGES] + spread
-    if off @ np.linalg.solve(both, off) > _MOST_CHI2:
-        return belief, _contradiction(telemetry, float(view.position_m[2]), pitch_deg)
-    gain = before[:, :CHANGES] @ np.linalg.inv(both)
-    after = before - gain @ before[:CHANGES]
-    return Belief(belief.state.changed(gain @ off), np.asarray(np.linalg.inv((after + after.T) / 2.0))), ""
+    return in_frame_of(told, view).change_from(view), spread
 
 
-def _contradiction(telemetry: Telemetry, height_m: float, pitch_deg: float) -> str:
+def _contradiction(belief: Belief, telemetry: Telemetry) -> str:
+    view = belief.state.view
     said = f"a height of {telemetry.height_m:.1f} m"
-    seen = f"{height_m:.1f} m"
+    seen = f"{view.position_m[2]:.1f} m"
     if telemetry.has_attitude:
-        said, seen = f"{said} and a pitch of {telemetry.pitch_deg:.0f} degrees", f"{seen} and {pitch_deg:.0f} degrees"
+        said = f"{said} and a pitch of {telemetry.pitch_deg:.0f} degrees"
+        seen = f"{seen} and {np.rad2deg(view.pitch_rad):.0f} degrees"
     return f"the telemetry says {said}, the picture {seen}"

@@ -137,6 +137,7 @@ class CameraBelief:
         frame_of: str,
         keeper: str = "",
         height_known: bool = True,
+        doubt: FloatArray | None = None,
     ) -> None:
         """Begin, or begin again; the moment is then held.
 
@@ -147,6 +148,7 @@ class CameraBelief:
             frame_of: Whose the site frame is.
             keeper: Name of the reference whose height is the belief's.
             height_known: Whether that was measured by hand.
+            doubt: (9, 9) covariance that no further look takes away.
         """
         lasting_share = None if keeper else LASTING_SHARE
         by = keeper or source
@@ -157,6 +159,7 @@ class CameraBelief:
             height_known=height_known,
             lasting_share=lasting_share,
             by=by,
+            doubt=doubt,
         )
         if frame_of != self.frame_of:
             self.site_frame += 1

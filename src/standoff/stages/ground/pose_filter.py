@@ -78,7 +78,7 @@ class PoseFilter:
         self._observed_s: dict[str, float] = {}
         self._lasting = LastingErrors()
         self._same_s, self._lasting_share = _SAME_S, LASTING_SHARE
-        self._height_doubt_m2 = np.zeros((STATE, STATE))
+        self._doubt = np.zeros((STATE, STATE))
 
     @property
     def now(self) -> Estimate | None:
@@ -99,6 +99,7 @@ class PoseFilter:
         height_known: bool = True,
         lasting_share: float | None = None,
         by: str = "",
+        doubt: FloatArray | None = None,
     ) -> None:
         """Begin, or begin again, with a belief about this frame.
 
@@ -110,21 +111,22 @@ class PoseFilter:
             lasting_share: Of the belief's covariance, what is there in every frame and never averages out; None: what
                 edges of a reference leave, more of it while the lens is unsure.
             by: Whose observation it is.
+            doubt: (9, 9) covariance that no look takes away, because looks alike have two explanations.
         """
         self._motion = motion
         covariance = _inverse(belief.information)
         lens_sure = covariance[6, 6] < _SURE_FOCAL_SIGMA**2
-        self._height_doubt_m2 = np.zeros((STATE, STATE))
+        self._doubt = np.zeros((STATE, STATE)) if doubt is None else doubt
         if not height_known:
             # The top is where it is seen: a higher solid puts the ground lower and the camera higher above it.
             together = np.zeros(STATE)
             together[[5, HEIGHT]] = _GUESSED_HEIGHT_SIGMA_M
-            self._height_doubt_m2 = np.outer(together, together)
+            self._doubt = self._doubt + np.outer(together, together)
         self._same_s = _SAME_S if lens_sure else _SAME_UNSURE_S
         self._lasting_share = LASTING_SHARE if lens_sure else _LASTING_UNSURE_SHARE
         if lasting_share is not None:
             self._lasting_share = lasting_share
-        lasting = self._lasting_share * covariance + self._height_doubt_m2
+        lasting = self._lasting_share * covariance + self._doubt
         self._lost = None
         self._now = Estimate(belief.state, covariance, lasting)
         self._now_s = time_s
@@ -200,7 +202,7 @@ class PoseFilter:
             [0.0] * 6 + [1.0] * 3
         )
         try:
-            lasting = self._lasting_share * np.linalg.inv(alone + 1e-6 * before) + self._height_doubt_m2
+            lasting = self._lasting_share * np.linalg.inv(alone + 1e-6 * before) + self._doubt
             back = _inverse(self._by_key)
         except np.linalg.LinAlgError:
             return

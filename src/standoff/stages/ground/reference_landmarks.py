@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
 from standoff.core.homography import FloatArray
 from standoff.core.types import NoGroundMap
-from standoff.stages.ground.beside import with_telemetry
+from standoff.stages.ground.beside import agrees_with_telemetry, with_telemetry
 from standoff.stages.ground.camera_belief import STATED, CameraBelief, Moment
 from standoff.stages.ground.lens_check import found_with_another_lens, refitted_lens
 from standoff.stages.ground.placement import Placement
@@ -18,6 +19,7 @@ from standoff.stages.ground.solid import SolidState
 from standoff.stages.ground.solid_fit import Belief
 from standoff.stages.ground.solid_observer import Reference, SolidObserver
 from standoff.stages.ground.solid_search import NOT_THERE
+from standoff.stages.ground.turned import doubt_between
 from standoff.stages.ground.which_box import sort_out
 
 OTHERWISE = "a reference does not look as it must from where the camera is"
@@ -88,21 +90,24 @@ class ReferenceLandmarks:
                 return ""
         taken = [other.box for other in self._solids if other is not solid and other.box is not None]
         held = belief.by_landmark and moment.held
-        found = solid.search(moment.gray, time_s, moment.detections, belief.lens, held=held, taken=taken)
+        telemetry = moment.frame.telemetry if self._telemetry else None
+        agrees = None if telemetry is None else partial(agrees_with_telemetry, telemetry=telemetry)
+        found = solid.search(moment.gray, time_s, moment.detections, belief.lens, held=held, taken=taken, agrees=agrees)
         if isinstance(found, NoGroundMap):
             if found.reason in (NOT_THERE, NO_QUADRILATERAL):
                 self._doubt_lens(moment, belief, solid)
             return found.reason
         own = solid.belief(found)
+        doubt = doubt_between(own, found.alternatives, solid.reference.shape)
         outranks = solid.reference.place_known and belief.frame_of not in ("", STATED)
         if not held or outranks:
-            self._begin(solid, own, moment, belief)
+            self._begin(solid, own, doubt, moment, belief)
             return ""
         reason = _join(solid, own, moment, belief)
         alone = len(self._solids) == 1 and belief.source == "reference"
         if reason and alone and solid.is_elsewhere(time_s, moment.detections):
             # What was believed began with a mistake.
-            self._begin(solid, own, moment, belief)
+            self._begin(solid, own, doubt, moment, belief)
             return ""
         return reason
 
@@ -116,7 +121,9 @@ class ReferenceLandmarks:
         if text:
             belief.warnings.setdefault("lens", f"{text} ({moment.text})")
 
-    def _begin(self, solid: SolidObserver, own: Belief, moment: Moment, belief: CameraBelief) -> None:
+    def _begin(
+        self, solid: SolidObserver, own: Belief, doubt: FloatArray, moment: Moment, belief: CameraBelief
+    ) -> None:
         own, text = refitted_lens(moment.luma, solid.reference.shape, own, belief.lens)
         if text:
             belief.warnings.setdefault("lens", f"{text} ({moment.text})")
@@ -132,7 +139,7 @@ class ReferenceLandmarks:
         if frame_of != belief.frame_of:
             for other in self._solids:
                 other.forget_place()
-        belief.begin("reference", own, moment, frame_of=frame_of, keeper=solid.name, height_known=known)
+        belief.begin("reference", own, moment, frame_of=frame_of, keeper=solid.name, height_known=known, doubt=doubt)
         solid.defines_frame()
         moment.anchors_px.append(solid.note(own.state))
 

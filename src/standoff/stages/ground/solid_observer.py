@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -191,6 +191,7 @@ class SolidObserver:
         *,
         held: bool,
         taken: Sequence[FloatArray],
+        agrees: Callable[[Belief], bool] | None,
     ) -> Found | NoGroundMap:
         """Search for it where the operator or the detector says that it is.
 
@@ -201,6 +202,7 @@ class SolidObserver:
             camera: What is known of the lens.
             held: Whether there is a map anyway; then it is searched for if it is new, or not where it should be.
             taken: (4,) each: boxes of other references.
+            agrees: Decides between two ways to see it; None: nothing does.
 
         Returns:
             It in its own frame, or why it was not found.
@@ -213,7 +215,7 @@ class SolidObserver:
         again_s = _LOOK_ELSEWHERE_S if held else _SEARCH_AGAIN_S
         if self._remember and self._searched is not None and 0.0 <= time_s - self._searched[0] < again_s:
             return self._searched[1]
-        found = search_solid(gray, box, self.reference.shape, camera, self.height)
+        found = search_solid(gray, box, self.reference.shape, camera, self.height, agrees)
         self._searched = (time_s, NoGroundMap(NOT_DUE) if isinstance(found, Found) else found)
         return found
 

@@ -8,8 +8,8 @@ wins at which the picture has most of its edges.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from functools import cache
 
 import cv2
@@ -92,10 +92,12 @@ class Found:
     Attributes:
         fit: Where, from all edges.
         prior: What was known beforehand, to which `fit.information` adds.
+        alternatives: What else explains the picture nearly as well, a few pixels from it.
     """
 
     fit: SolidFit
     prior: Belief
+    alternatives: tuple[Belief, ...] = ()
 
     def belief(self) -> Belief:
         """Return what is known now."""
@@ -103,7 +105,12 @@ class Found:
 
 
 def search_solid(
-    gray: ImageArray, box_xyxy_px: FloatArray, shape: ReferenceShape, camera: CameraPrior, height: HeightPrior
+    gray: ImageArray,
+    box_xyxy_px: FloatArray,
+    shape: ReferenceShape,
+    camera: CameraPrior,
+    height: HeightPrior,
+    agrees: Callable[[Belief], bool] | None = None,
 ) -> Found | NoGroundMap:
     """Find the reference in a box.
 
@@ -113,6 +120,8 @@ def search_solid(
         shape: True shape.
         camera: What is known of it, for pictures of this size.
         height: What is known of the reference's height.
+        agrees: Whether something else, such as the drone's telemetry, agrees with a belief; it decides where the
+            picture alone leaves two ways. None: there is nothing else.
 
     Returns:
         The reference, or why it cannot be told where it is. For a shape that can be turned onto itself corner 0 is
@@ -126,7 +135,7 @@ def search_solid(
     task = _Task(gray, picture, box_xyxy_px, box, shape, camera, height)
     found: Found | NoGroundMap = NoGroundMap(NOT_THERE)
     for smoothing_px in _SMOOTHINGS_PX:
-        found = _search(task, smoothing_px)
+        found = _search(task, smoothing_px, agrees)
         if isinstance(found, Found):
             break
     return found
@@ -155,24 +164,36 @@ class _Task:
     height: HeightPrior
 
 
-def _search(task: _Task, smoothing_px: float) -> Found | NoGroundMap:
+@dataclass(frozen=True, slots=True, eq=False)
+class _Candidate:
+    """A fit, how much of it the picture has, and whether that is enough."""
+
+    score: float
+    found: Found
+    believable: bool
+
+    @property
+    def state(self) -> SolidState:
+        return self.found.fit.state
+
+
+def _search(task: _Task, smoothing_px: float, agrees: Callable[[Belief], bool] | None) -> Found | NoGroundMap:
     edges = _edges(task, smoothing_px)
     if isinstance(edges, NoGroundMap):
         return edges
     states = _by_quadrilaterals(task, edges) if len(task.shape.corners_m) == 4 else _by_matching(task, edges)
     if isinstance(states, NoGroundMap):
         return states
-    fits: list[tuple[float, Found]] = []
+    candidates: list[_Candidate] = []
     for state in states[: _REFINED * len(task.height.tried_m)]:
-        if len(fits) == _REFINED:
+        if sum(one.believable for one in candidates) == _REFINED:
             break
         prior = _prior(state, task.camera, task.height)
         fit = fit_solid(task.gray, task.shape, prior, _FIT_PX, start=state)
-        if fit is not None and _believable(fit, task.shape) and _expected(fit, prior, task.shape):
-            score = _score_of(task, fit.state, fit.support, fit.length_px)
-            if score > 0:
-                fits.append((score, Found(fit, prior)))
-    return _best(fits, task.shape)
+        if fit is not None and (score := _score_of(task, fit.state, fit.support, fit.length_px)) > 0:
+            believable = _believable(fit, task.shape) and _expected(fit, prior, task.shape)
+            candidates.append(_Candidate(score, Found(fit, prior), believable))
+    return _best(candidates, task.shape, agrees)
 
 
 def _by_quadrilaterals(task: _Task, edges: Edges) -> list[SolidState] | NoGroundMap:
@@ -246,16 +267,27 @@ def _expected(fit: SolidFit, prior: Belief, shape: ReferenceShape) -> bool:
     return len(shape.corners_m) == 4 or float(change @ prior.information @ change) < _MAX_SURPRISE
 
 
-def _best(fits: list[tuple[float, Found]], shape: ReferenceShape) -> Found | NoGroundMap:
-    """Return the fit with the best score, unless another one elsewhere is as good."""
-    if not fits:
+def _best(
+    candidates: list[_Candidate], shape: ReferenceShape, agrees: Callable[[Belief], bool] | None
+) -> Found | NoGroundMap:
+    """Return the candidate with the best score that can be believed, unless another one elsewhere is as good.
+
+    The other one need not be believable: where the picture has too little of what is there, it has less of what is not.
+    """
+    candidates = sorted(candidates, key=lambda one: -one.score)
+    best = next((one for one in candidates if one.believable), None)
+    if best is None:
         return NoGroundMap(NOT_THERE)
-    fits = sorted(fits, key=lambda one: -one[0])
-    best_score, best = fits[0]
-    for score, other in fits[1:]:
-        if score >= _RIVAL_SCORE * best_score and _apart_px(best.fit.state, other.fit.state, shape) > _RIVAL_PX:
+    good = [one for one in candidates if one.score >= _RIVAL_SCORE * best.score]
+    if any(_apart_px(best.state, one.state, shape) > _RIVAL_PX for one in good):
+        good = [] if agrees is None else [one for one in good if agrees(one.found.belief())]
+        if not (good and good[0].believable):
             return NoGroundMap(AMBIGUOUS)
-    return best
+        best = good[0]
+        if any(_apart_px(best.state, one.state, shape) > _RIVAL_PX for one in good):
+            return NoGroundMap(AMBIGUOUS)
+    others = tuple(one.found.belief() for one in good if one is not best and one.believable)
+    return replace(best.found, alternatives=others)
 
 
 def _apart_px(one: SolidState, other: SolidState, shape: ReferenceShape) -> float:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from standoff.core.homography import FloatArray
@@ -32,6 +34,25 @@ def turned_like(
     if corner_px is not None:
         return ways[int(np.argmin([np.linalg.norm(corner - corner_px) for corner in corners]))]
     return ways[int(np.argmin([corner[0] - corner[1] for corner in corners]))]
+
+
+def doubt_between(belief: Belief, alternatives: Sequence[Belief], shape: ReferenceShape) -> FloatArray:
+    """Return (9, 9) the covariance that is owed to alternatives that explain a picture as well, the furthest of them.
+
+    Args:
+        belief: What is taken.
+        alternatives: With the corners named in any way.
+        shape: The reference's.
+    """
+    doubt = np.zeros((STATE, STATE))
+    for other in alternatives:
+        like = turned_like(other, shape, last=belief.state, corner_px=None)
+        change = like.state.change_from(belief.state)
+        # One of two is right, and each as likely.
+        owed = np.outer(change, change) / 2.0
+        if np.trace(owed[SHIFT, SHIFT]) > np.trace(doubt[SHIFT, SHIFT]):
+            doubt = owed
+    return doubt
 
 
 def _corner_px(state: SolidState, shape: ReferenceShape) -> FloatArray:
