@@ -59,7 +59,7 @@ def agrees_with_telemetry(belief: Belief, telemetry: Telemetry) -> bool:
 
 
 def _compared(belief: Belief, telemetry: Telemetry) -> tuple[FloatArray, FloatArray] | None:
-    """Return (8,) the change from a belief to what telemetry says, and (8, 8) its errors; None where it says nothing."""
+    """Return (8,) the change from a belief to what telemetry says, and (8, 8) its errors; None: it says nothing."""
     view = belief.state.view
     said = telemetry
     if not telemetry.has_attitude:
