@@ -73,7 +73,8 @@ class Flight:
         for level in np.linspace(0.0, HEIGHT_M, 40):
             self._fill(picture, view, float(level), LIT_SIDE)
         self._fill(picture, view, HEIGHT_M, LIT_TOP)
-        return np.clip(cv2.GaussianBlur(picture, (0, 0), 0.8) + self._noise, 0, 255).astype(np.uint8)
+        noisy = np.clip(cv2.GaussianBlur(picture, (0, 0), 0.8) + self._noise, 0, 255)
+        return np.asarray(noisy, dtype=np.uint8)
 
     def _fill(self, picture: ImageArray, view: View, height_m: float, level: int) -> None:
         corners_px = view.project(np.column_stack([SHAPE.corners_m, np.full(4, height_m)]))
@@ -109,8 +110,8 @@ def test_baseline_one_lucas_kanade_of_as_many_points(benchmark: BenchmarkFixture
     )
     x, y = np.meshgrid(np.linspace(30, 930, 14), np.linspace(30, 510, 8))
     points = np.column_stack([x.ravel(), y.ravel()]).astype(np.float32)[:, None]
-    window = {"winSize": (15, 15), "maxLevel": 1}
-    found = benchmark(lambda: cv2.calcOpticalFlowPyrLK(before, now, points, None, **window)[1])
+    nowhere = np.empty_like(points)
+    found = benchmark(lambda: cv2.calcOpticalFlowPyrLK(before, now, points, nowhere, winSize=(15, 15), maxLevel=1)[1])
     assert found.mean() > 0.9
 
 

@@ -36,11 +36,13 @@ def reference_basis(shape: ReferenceShape) -> str:
     'a reference with 6 sides of 1.5 m'
     """
     corners, sides = shape.corners_m, shape.sides_m
-    if len(corners) != 4 and len(shape.turns_onto_itself()) == len(corners):
-        return f"a reference with {len(sides)} sides of {sides[0]:.4g} m"
+    uneven = f"a reference with sides of {', '.join(f'{side:.4g}' for side in sides)} m"
+    if len(corners) != 4:
+        is_regular = len(shape.turns_onto_itself()) == len(corners)
+        return f"a reference with {len(sides)} sides of {sides[0]:.4g} m" if is_regular else uneven
     diagonals = np.linalg.norm(corners[2:] - corners[:2], axis=1)
-    if len(corners) != 4 or np.ptp(diagonals) > _EQUAL or np.abs(sides[:2] - sides[2:]).max() > _EQUAL:
-        return f"a reference with sides of {', '.join(f'{side:.4g}' for side in sides)} m"
+    if np.ptp(diagonals) > _EQUAL or np.abs(sides[:2] - sides[2:]).max() > _EQUAL:
+        return uneven
     if np.ptp(sides) < _EQUAL:
         return f"a square reference of {sides[0]:.4g} m"
     return f"a rectangular reference of {sides[0]:.4g} by {sides[1]:.4g} m"

@@ -121,7 +121,7 @@ class ReferenceShape:
         Raises:
             GroundError: The side is not a length, or there are too few or too many.
 
-        >>> ReferenceShape.regular(4, 2.0).corners_m.round(6).tolist()
+        >>> (ReferenceShape.regular(4, 2.0).corners_m.round(6) + 0.0).tolist()
         [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]]
         """
         if not (np.isfinite(side_m) and side_m > 0):

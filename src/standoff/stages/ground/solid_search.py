@@ -8,14 +8,14 @@ wins at which the picture has most of its edges.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
 
 import cv2
 import numpy as np
 
-from standoff.core.camera import Camera, CameraPrior
+from standoff.core.camera import CameraPrior
 from standoff.core.homography import FloatArray
 from standoff.core.pose import LENS, SHIFT, TURN, View
 from standoff.core.types import ImageArray, IntArray, NoGroundMap
@@ -23,13 +23,13 @@ from standoff.stages.ground.edge_field import EdgeField
 from standoff.stages.ground.edges import Edges, between_pixels, canny, sobel_gradients
 from standoff.stages.ground.oriented import likely_quadrilaterals, noise_thresholds
 from standoff.stages.ground.outline import BOX_OUTSIDE, TOO_FEW_EDGES, undistorted_box
-from standoff.stages.ground.quadrilateral import NO_QUADRILATERAL, ORDERS
+from standoff.stages.ground.quadrilateral import NO_QUADRILATERAL
 from standoff.stages.ground.shape import ReferenceShape
-from standoff.stages.ground.silhouette import silhouettes
 from standoff.stages.ground.solid import HEIGHT, STATE, SolidState
 from standoff.stages.ground.solid_edges import Blurred
 from standoff.stages.ground.solid_fit import Belief, SolidFit, fit_solid, outline_support, side_support
 from standoff.stages.ground.solid_match import matching_states
+from standoff.stages.ground.solid_outline import mixed_states, states_of
 from standoff.stages.ground.solid_poses import AROUND, ground_around_px
 
 AMBIGUOUS = "the reference could lie in two ways"
@@ -40,12 +40,9 @@ _QUADRILATERALS, _MIXED = 24, 6
 _MARGIN = 0.12
 """The search goes this share of the box's longer side beyond the box: detectors cut corners."""
 
-_REPROJECTION_PX, _REPROJECTION_SHARE = 2.0, 0.08
 _ROLL_SIGMA_RAD = np.deg2rad(5.0)
 """Gimbals keep the horizon level; hands nearly so."""
 
-_MAX_ROLL_RAD = np.deg2rad(30.0)
-_MIN_PITCH_RAD = np.deg2rad(5.0)
 _BARE_COST, _ROLL_COST, _PATCHY = 0.45, 0.1, 0.33
 _FACE_RINGS = 5
 _REFINED = 10
@@ -199,12 +196,13 @@ def _search(task: _Task, smoothing_px: float, agrees: Callable[[Belief], bool] |
 def _by_quadrilaterals(task: _Task, edges: Edges) -> list[SolidState] | NoGroundMap:
     """Return the states that quadrilaterals of edges speak for, the best first."""
     outlines = likely_quadrilaterals(edges, undistorted_box(task.box, task.camera.camera), _QUADRILATERALS)
-    states = [state for outline in outlines for state in _states(outline, task.shape, task.camera.camera, task.height)]
+    camera, heights_m = task.camera.camera, task.height.tried_m
+    states = [state for outline in outlines for state in states_of(outline, task.shape, camera, heights_m)]
     if not states:
         return NoGroundMap(NO_QUADRILATERAL)
     scores = [_score(task, state) for state in states]
     leading = [states[k] for k in np.argsort(-np.array(scores), kind="stable")[:_MIXED]]
-    mixed = [other for state in leading for other in _mixed(state, task.shape)]
+    mixed = [other for state in leading for other in mixed_states(state, task.shape)]
     states += mixed
     scores += [_score(task, state) for state in mixed]
     return [states[k] for k in np.argsort(-np.array(scores), kind="stable")]
@@ -313,45 +311,6 @@ def _top_px(state: SolidState, shape: ReferenceShape) -> FloatArray:
     return state.view.project(np.column_stack([shape.corners_m, np.full(len(shape.corners_m), state.height_m)]))
 
 
-def _states(outline: FloatArray, shape: ReferenceShape, camera: Camera, height: HeightPrior) -> Iterator[SolidState]:
-    """Give every state at which the top or the base of the solid has this outline."""
-    limit_px = max(_REPROJECTION_PX, _REPROJECTION_SHARE * float(np.linalg.norm(outline[1] - outline[0])))
-    turns = shape.turns_onto_itself()
-    for order in ORDERS[: 4 // len(turns)]:
-        for view in _views(outline[order], shape, camera, limit_px):
-            for height_m in height.tried_m:
-                for level_m in {height_m, 0.0}:
-                    lifted = View(camera, view.position_m + np.array([0.0, 0.0, level_m]), view.site_to_camera)
-                    yield SolidState(lifted, height_m)
-
-
-def _mixed(state: SolidState, shape: ReferenceShape) -> Iterator[SolidState]:
-    """Give the states in which some sides of an outline taken for the top's are the lower edges of these sides."""
-    outline_px = state.view.project_pinhole(
-        np.column_stack([shape.corners_m, np.full(len(shape.corners_m), state.height_m)])
-    )
-    if np.isfinite(outline_px).all() and state.height_m > 0:
-        yield from silhouettes(state, outline_px, shape)
-
-
-def _views(corners_px: FloatArray, shape: ReferenceShape, camera: Camera, limit_px: float) -> Iterator[View]:
-    """Give the views from above, nearly level, from which the shape at z = 0 has these corners."""
-    places = np.column_stack([shape.corners_m, np.zeros(len(shape.corners_m))])
-    middle = places.mean(axis=0)
-    found, turns, shifts, errors = cv2.solvePnPGeneric(
-        places - middle, corners_px[:, None], camera.matrix, None, flags=cv2.SOLVEPNP_IPPE
-    )
-    for k in range(found):
-        if float(np.ravel(errors[k])[0]) > limit_px:
-            continue
-        rotation = cv2.Rodrigues(turns[k])[0]
-        left, _, right = np.linalg.svd(rotation)
-        rotation = left @ right
-        view = View(camera, middle - rotation.T @ shifts[k].ravel(), rotation)
-        if view.position_m[2] > 0 and abs(view.roll_rad) < _MAX_ROLL_RAD and view.pitch_rad > _MIN_PITCH_RAD:
-            yield view
-
-
 def _score(task: _Task, state: SolidState) -> float:
     """Return px of outline that the picture has where a state puts it, as `_score_of`."""
     samples, support = outline_support(task.picture, task.shape, state)
@@ -400,18 +359,21 @@ def _patchy_share(picture: Blurred, top_px: FloatArray) -> float:
 def _all_over_face(corners: int) -> FloatArray:
     """Return (G, N) weights of a face's corners that make points all over it, away from its sides."""
     if corners == 4:
-        u, v = (side.ravel() for side in np.meshgrid(np.linspace(0.15, 0.85, 8), np.linspace(0.15, 0.85, 8)))
-        return np.column_stack([(1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v])
-    # Rings around the middle: the number of points on each grows with its size, as its share of the area does.
-    rings = []
-    for ring in range(1, _FACE_RINGS + 1):
-        along = (np.arange(ring) + 0.5) / ring
-        for k in range(corners):
-            weights = np.zeros((ring, corners))
-            weights[:, k], weights[:, (k + 1) % corners] = 1.0 - along, along
-            share = 0.7 * ring / _FACE_RINGS
-            rings.append(share * weights + (1.0 - share) / corners)
-    return np.concatenate(rings)
+        u, v = (axis.ravel() for axis in np.meshgrid(np.linspace(0.15, 0.85, 8), np.linspace(0.15, 0.85, 8)))
+        everywhere = np.column_stack([(1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v])
+    else:
+        # Rings around the middle: the number of points on each grows with its size, as its share of the area does.
+        parts = []
+        for ring in range(1, _FACE_RINGS + 1):
+            share, along = 0.7 * ring / _FACE_RINGS, (np.arange(ring) + 0.5) / ring
+            for k in range(corners):
+                weights = np.full((ring, corners), (1.0 - share) / corners)
+                weights[:, k] += share * (1.0 - along)
+                weights[:, (k + 1) % corners] += share * along
+                parts.append(weights)
+        everywhere = np.concatenate(parts)
+    everywhere.setflags(write=False)
+    return everywhere
 
 
 def _outside_share(points_px: FloatArray, box: FloatArray) -> float:
