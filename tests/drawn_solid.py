@@ -75,6 +75,7 @@ def drawn(
     sun_m: tuple[float, float] | None = None,
     sanded_side: int | None = None,
     solid: bool = True,
+    dusk: bool = False,
 ) -> ImageArray:
     """Draw ground, shadow, sides, top and sand, each pixel the mean of sixteen rays, then blur and noise.
 
@@ -86,8 +87,9 @@ def drawn(
         sun_m: Where the shadow of the top's corners falls, from the corners of the base.
         sanded_side: A side with sand heaped against it up to the top.
         solid: Whether there is anything but ground.
+        dusk: The sides are as dark as the ground.
     """
-    faces = [_faces(shape, state, sun_m, sanded_side)] if solid else []
+    faces = [_faces(shape, state, sun_m, sanded_side, (_GROUND,) if dusk else _SIDES)] if solid else []
     return _photographed(faces, state.view, seed, noise)
 
 
@@ -95,7 +97,7 @@ def drawn_solids(
     solids: Sequence[tuple[ReferenceShape, SolidState]], view: View, *, seed: int = 0, noise: float = 1.5
 ) -> ImageArray:
     """Draw several that do not hide each other, as `drawn`."""
-    return _photographed([_faces(shape, state, None, None) for shape, state in solids], view, seed, noise)
+    return _photographed([_faces(shape, state, None, None, _SIDES) for shape, state in solids], view, seed, noise)
 
 
 def _photographed(solids: Sequence[list[tuple[FloatArray, float]]], view: View, seed: int, noise: float) -> ImageArray:
@@ -108,9 +110,13 @@ def _photographed(solids: Sequence[list[tuple[FloatArray, float]]], view: View, 
 
 
 def _faces(
-    shape: ReferenceShape, state: SolidState, sun_m: tuple[float, float] | None, sanded_side: int | None
+    shape: ReferenceShape,
+    state: SolidState,
+    sun_m: tuple[float, float] | None,
+    sanded_side: int | None,
+    greys: Sequence[float],
 ) -> list[tuple[FloatArray, float]]:
-    """Return convex polygons (N, 3) of the site and their grey levels, what is behind first."""
+    """Return convex polygons (N, 3) of the site and their grey levels, of sides in turn, what is behind first."""
     base = np.column_stack([shape.corners_m, np.zeros(len(shape.corners_m))])
     top = base + np.array([0.0, 0.0, state.height_m])
     count = len(base)
@@ -125,7 +131,7 @@ def _faces(
         outward = np.array([along[side, 1], -along[side, 0]])
         if (state.view.position_m[:2] - base[side, :2]) @ outward > 0:
             corners = np.stack([base[side], base[following[side]], top[following[side]], top[side]])
-            faces.append((corners, _SIDES[side % len(_SIDES)]))
+            faces.append((corners, greys[side % len(greys)]))
     faces.append((top, _TOP))
     if sanded_side is not None:
         start, end = base[sanded_side], base[following[sanded_side]]

@@ -14,8 +14,9 @@ from standoff.core.pose import View, roll_and_pitch
 from standoff.core.types import Detections, GroundMap, ImageArray, NoCameraMotion, NoGroundMap
 from standoff.stages.ground import FusedGround, GivenPlace, Reference, ReferenceParams, ReferenceShape
 from standoff.stages.ground.solid import SolidState, sample_edges
+from standoff.stages.ground.solid_choice import Found
 from standoff.stages.ground.solid_poses import Poses, poses_in_box, to_pinhole
-from standoff.stages.ground.solid_search import Found, HeightPrior, search_solid
+from standoff.stages.ground.solid_search import HeightPrior, search_solid
 
 TRIANGLE = ReferenceShape.from_corners([[0.0, 0.0], [3.2, 0.0], [1.0, 2.6]])
 PENTAGON = ReferenceShape.from_corners([[0.0, 0.0], [2.4, 0.0], [3.2, 1.4], [1.6, 3.0], [0.0, 2.2]])

@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import partial
+
 import numpy as np
 import pytest
 from drawn_solid import box_around, drawn, lens, random_state, top_px
@@ -7,10 +10,12 @@ from tolerances import SOLID_PX
 
 from standoff.core.camera import CameraPrior
 from standoff.core.homography import FloatArray
-from standoff.core.types import NoGroundMap
+from standoff.core.types import ImageArray, NoGroundMap
 from standoff.stages.ground import ReferenceShape
 from standoff.stages.ground.solid import SolidState
-from standoff.stages.ground.solid_search import Found, HeightPrior, search_solid
+from standoff.stages.ground.solid_choice import Candidate, Found, best_of
+from standoff.stages.ground.solid_fit import Belief, fit_solid
+from standoff.stages.ground.solid_search import HeightPrior, search_solid
 
 SQUARE = ReferenceShape.square(2.89)
 RECTANGLE = ReferenceShape.rectangle(1.8, 3.2)
@@ -85,3 +90,63 @@ def test_a_solid_of_quite_another_shape_is_not_taken_for_the_reference() -> None
         picture, box_around(long, state), SQUARE, CameraPrior.calibrated(CAMERA), HeightPrior.known(HEIGHT_M)
     )
     assert isinstance(wrong, NoGroundMap)
+
+
+def test_sides_as_dark_as_the_ground_are_no_reason_to_put_the_top_elsewhere() -> None:
+    found = []
+    for seed in range(200, 216):
+        state = random_state(np.random.default_rng(seed), SQUARE, CAMERA, HEIGHT_M)
+        picture = drawn(SQUARE, state, seed=seed, noise=9.0, dusk=True)
+        camera = CameraPrior.calibrated(CAMERA)
+        one = search_solid(picture, box_around(SQUARE, state), SQUARE, camera, HeightPrior.known(HEIGHT_M))
+        if isinstance(one, Found):
+            found.append(_off_px(one, SQUARE, state))
+    assert len(found) >= 4
+    assert max(found) < 2.0 * SOLID_PX
+
+
+def test_where_two_ways_are_left_something_else_decides() -> None:
+    beliefs: list[Belief] = []
+
+    def none_agrees(belief: Belief) -> bool:
+        beliefs.append(belief)
+        return False
+
+    state = random_state(np.random.default_rng(3), SQUARE, CAMERA, HEIGHT_M)
+    picture, box = drawn(SQUARE, state, seed=3, noise=4.0), box_around(SQUARE, state)
+    sure = CameraPrior.calibrated(CAMERA), HeightPrior.known(HEIGHT_M)
+    assert isinstance(search_solid(picture, box, SQUARE, *sure, none_agrees), Found)
+    assert not beliefs, "nothing needs to be asked where one way is left"
+    likely = _candidate(picture, state, 12.0)
+    alike = [likely, _aside(likely, 11.9)]
+    assert isinstance(best_of(alike, SQUARE, None), NoGroundMap)
+    assert isinstance(best_of(alike, SQUARE, none_agrees), NoGroundMap)
+    for right in alike:
+        chosen = best_of(alike, SQUARE, partial(_is_at, right.state))
+        assert isinstance(chosen, Found) and chosen.fit is right.found.fit
+
+
+def test_what_is_seen_less_of_is_not_believed_beside_what_cannot_be() -> None:
+    state = random_state(np.random.default_rng(3), SQUARE, CAMERA, HEIGHT_M)
+    picture = drawn(SQUARE, state, seed=3)
+    likely = _candidate(picture, state, 12.0)
+    less = _aside(likely, 5.0)
+    assert isinstance(best_of([replace(likely, believable=False), less], SQUARE, None), NoGroundMap)
+    assert isinstance(best_of([likely, replace(less, believable=False)], SQUARE, None), Found)
+
+
+def _is_at(state: SolidState, belief: Belief) -> bool:
+    return belief.state is state
+
+
+def _aside(one: Candidate, score: float) -> Candidate:
+    """Return a candidate half a metre away."""
+    moved = one.state.changed(np.array([0.0, 0.0, 0.0, 0.6, 0.3, 0.0, 0.0, 0.0, 0.0]))
+    return replace(one, score=score, found=Found(replace(one.found.fit, state=moved), one.found.prior))
+
+
+def _candidate(picture: ImageArray, state: SolidState, score: float) -> Candidate:
+    prior = Belief(state, np.diag([1.0] * 3 + [1e-4] * 3 + [1e6] * 2 + [1e4]))
+    fit = fit_solid(picture, SQUARE, prior, 5.0)
+    assert fit is not None
+    return Candidate(score, Found(fit, prior), believable=True)

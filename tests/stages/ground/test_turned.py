@@ -8,7 +8,7 @@ from tolerances import SAME_MAP_M
 from standoff.stages.ground import ReferenceShape
 from standoff.stages.ground.solid import STATE, SolidState
 from standoff.stages.ground.solid_fit import Belief
-from standoff.stages.ground.turned import turned_like
+from standoff.stages.ground.turned import doubt_between, turned_like
 
 SQUARE = ReferenceShape.square(2.0)
 HEXAGON = ReferenceShape.regular(6, 1.5)
@@ -69,3 +69,14 @@ def test_information_turns_with_the_site_so_that_what_is_known_of_the_picture_st
 def test_a_shape_that_cannot_be_turned_is_left_as_it_is() -> None:
     belief = _belief(_state(5, QUADRILATERAL))
     assert turned_like(belief, QUADRILATERAL, last=None, corner_px=np.zeros(2)) is belief
+
+
+def test_alternatives_that_are_the_same_turned_round_leave_no_doubt_and_others_do() -> None:
+    one = _belief(_state(4, SQUARE))
+    turned = [turned_like(one, SQUARE, last=None, corner_px=px) for px in top_px(SQUARE, one.state)]
+    np.testing.assert_allclose(doubt_between(one, turned, SQUARE), 0.0, atol=SAME_MAP_M)
+    shift = np.array([0.01, 0.0, 0.0, 0.3, -0.1, 0.4, 0.0, 0.0, 0.0])
+    for share in (0.5, 1.0):
+        other = Belief(one.state.changed(share * shift), one.information)
+        doubt = doubt_between(one, [*turned, other], SQUARE)
+        np.testing.assert_allclose(np.diag(doubt), (share * shift) ** 2 / 2.0, rtol=1e-6, atol=1e-9)

@@ -11,8 +11,9 @@ from standoff.core.homography import FloatArray
 from standoff.core.pose import LENS
 from standoff.core.types import ImageArray, Luma
 from standoff.stages.ground.shape import ReferenceShape
+from standoff.stages.ground.solid_choice import Found
 from standoff.stages.ground.solid_fit import Belief, fit_solid
-from standoff.stages.ground.solid_search import Found, HeightPrior, search_solid
+from standoff.stages.ground.solid_search import HeightPrior, search_solid
 
 _FOCAL = LENS.start
 _STATED_SIGMA, _FREE_SIGMA = 0.03, 0.4

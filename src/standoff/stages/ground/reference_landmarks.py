@@ -16,9 +16,9 @@ from standoff.stages.ground.placement import Placement
 from standoff.stages.ground.pose_filter import Estimate
 from standoff.stages.ground.quadrilateral import NO_QUADRILATERAL
 from standoff.stages.ground.solid import SolidState
+from standoff.stages.ground.solid_choice import NOT_THERE
 from standoff.stages.ground.solid_fit import Belief
 from standoff.stages.ground.solid_observer import Reference, SolidObserver
-from standoff.stages.ground.solid_search import NOT_THERE
 from standoff.stages.ground.turned import doubt_between
 from standoff.stages.ground.which_box import sort_out
 

@@ -18,8 +18,9 @@ from standoff.stages.ground.pose_filter import Estimate
 from standoff.stages.ground.projection import project, project_with_jacobians
 from standoff.stages.ground.shape import ReferenceShape
 from standoff.stages.ground.solid import HEIGHT, SolidState
+from standoff.stages.ground.solid_choice import Found
 from standoff.stages.ground.solid_fit import Belief, fit_solid
-from standoff.stages.ground.solid_search import Found, HeightPrior, search_solid
+from standoff.stages.ground.solid_search import HeightPrior, search_solid
 from standoff.stages.ground.turned import turned_like
 from standoff.stages.ground.where import NOT_SEEN, GivenPlace, detected_box
 

@@ -9,7 +9,7 @@ wins at which the picture has most of its edges.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 
 import cv2
@@ -18,7 +18,7 @@ import numpy as np
 from standoff.core.camera import CameraPrior
 from standoff.core.homography import FloatArray
 from standoff.core.pose import LENS, SHIFT, TURN, View
-from standoff.core.types import ImageArray, IntArray, NoGroundMap
+from standoff.core.types import ImageArray, NoGroundMap
 from standoff.stages.ground.edge_field import EdgeField
 from standoff.stages.ground.edges import Edges, between_pixels, canny, sobel_gradients
 from standoff.stages.ground.oriented import likely_quadrilaterals, noise_thresholds
@@ -26,14 +26,11 @@ from standoff.stages.ground.outline import BOX_OUTSIDE, TOO_FEW_EDGES, undistort
 from standoff.stages.ground.quadrilateral import NO_QUADRILATERAL
 from standoff.stages.ground.shape import ReferenceShape
 from standoff.stages.ground.solid import HEIGHT, STATE, SolidState
+from standoff.stages.ground.solid_choice import NOT_THERE, Candidate, Found, best_of, upper_px
 from standoff.stages.ground.solid_edges import Blurred
 from standoff.stages.ground.solid_fit import Belief, SolidFit, fit_solid, outline_support, side_support
 from standoff.stages.ground.solid_match import matching_states
 from standoff.stages.ground.solid_outline import mixed_states, states_of
-from standoff.stages.ground.solid_poses import AROUND, ground_around_px
-
-AMBIGUOUS = "the reference could lie in two ways"
-NOT_THERE = "no solid of the reference's shape fits the edges in its box"
 
 _MIN_EDGES = 16
 _QUADRILATERALS, _MIXED = 24, 6
@@ -47,7 +44,6 @@ _BARE_COST, _ROLL_COST, _PATCHY = 0.45, 0.1, 0.33
 _FACE_RINGS = 5
 _REFINED = 10
 _FIT_PX = 5.0
-_RIVAL_SCORE, _RIVAL_PX = 0.9, 4.0
 _MAX_SURPRISE = 16.0
 """Four standard errors of what was known before."""
 
@@ -80,25 +76,6 @@ class HeightPrior:
     def unknown(cls) -> HeightPrior:
         """Return what can be said of any footing or plate."""
         return cls(0.35, 0.25, (0.0, 0.15, 0.3, 0.45, 0.6, 0.9))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Found:
-    """The reference in one picture.
-
-    Attributes:
-        fit: Where, from all edges.
-        prior: What was known beforehand, to which `fit.information` adds.
-        alternatives: What else explains the picture nearly as well, a few pixels from it.
-    """
-
-    fit: SolidFit
-    prior: Belief
-    alternatives: tuple[Belief, ...] = ()
-
-    def belief(self) -> Belief:
-        """Return what is known now."""
-        return Belief(self.fit.state, self.prior.information + self.fit.information)
 
 
 def search_solid(
@@ -161,19 +138,6 @@ class _Task:
     height: HeightPrior
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Candidate:
-    """A fit, how much of it the picture has, and whether that is enough."""
-
-    score: float
-    found: Found
-    believable: bool
-
-    @property
-    def state(self) -> SolidState:
-        return self.found.fit.state
-
-
 def _search(task: _Task, smoothing_px: float, agrees: Callable[[Belief], bool] | None) -> Found | NoGroundMap:
     edges = _edges(task, smoothing_px)
     if isinstance(edges, NoGroundMap):
@@ -181,7 +145,7 @@ def _search(task: _Task, smoothing_px: float, agrees: Callable[[Belief], bool] |
     states = _by_quadrilaterals(task, edges) if len(task.shape.corners_m) == 4 else _by_matching(task, edges)
     if isinstance(states, NoGroundMap):
         return states
-    candidates: list[_Candidate] = []
+    candidates: list[Candidate] = []
     for state in states[: _REFINED * len(task.height.tried_m)]:
         if sum(one.believable for one in candidates) == _REFINED:
             break
@@ -189,8 +153,8 @@ def _search(task: _Task, smoothing_px: float, agrees: Callable[[Belief], bool] |
         fit = fit_solid(task.gray, task.shape, prior, _FIT_PX, start=state)
         if fit is not None and (score := _score_of(task, fit.state, fit.support, fit.length_px)) > 0:
             believable = _believable(fit, task.shape) and _expected(fit, prior, task.shape)
-            candidates.append(_Candidate(score, Found(fit, prior), believable))
-    return _best(candidates, task.shape, agrees)
+            candidates.append(Candidate(score, Found(fit, prior), believable))
+    return best_of(candidates, task.shape, agrees)
 
 
 def _by_quadrilaterals(task: _Task, edges: Edges) -> list[SolidState] | NoGroundMap:
@@ -265,52 +229,6 @@ def _expected(fit: SolidFit, prior: Belief, shape: ReferenceShape) -> bool:
     return len(shape.corners_m) == 4 or float(change @ prior.information @ change) < _MAX_SURPRISE
 
 
-def _best(
-    candidates: list[_Candidate], shape: ReferenceShape, agrees: Callable[[Belief], bool] | None
-) -> Found | NoGroundMap:
-    """Return the candidate with the best score that can be believed, unless another one elsewhere is as good.
-
-    The other one need not be believable: where the picture has too little of what is there, it has less of what is not.
-    """
-    candidates = sorted(candidates, key=lambda one: -one.score)
-    best = next((one for one in candidates if one.believable), None)
-    if best is None:
-        return NoGroundMap(NOT_THERE)
-    good = [one for one in candidates if one.score >= _RIVAL_SCORE * best.score]
-    if any(_apart_px(best.state, one.state, shape) > _RIVAL_PX for one in good):
-        good = [] if agrees is None else [one for one in good if agrees(one.found.belief())]
-        if not (good and good[0].believable):
-            return NoGroundMap(AMBIGUOUS)
-        best = good[0]
-        if any(_apart_px(best.state, one.state, shape) > _RIVAL_PX for one in good):
-            return NoGroundMap(AMBIGUOUS)
-    others = tuple(one.found.belief() for one in good if one is not best and one.believable)
-    return replace(best.found, alternatives=others)
-
-
-def _apart_px(one: SolidState, other: SolidState, shape: ReferenceShape) -> float:
-    """Return how far apart two states put the corner that they agree on least."""
-    orders = _orders(shape)
-    apart = np.linalg.norm(_top_px(other, shape)[orders] - _top_px(one, shape), axis=-1).max(axis=-1)
-    if len(shape.corners_m) == 3:
-        # Up to four cameras see a triangle in the same place. What they disagree on is the ground around it.
-        around = np.linalg.norm(
-            ground_around_px(other.view, shape)[orders] - ground_around_px(one.view, shape), axis=-1
-        )
-        apart = np.maximum(apart, np.nan_to_num(around, nan=np.inf).max(axis=-1) / AROUND)
-    return float(apart.min())
-
-
-def _orders(shape: ReferenceShape) -> IntArray:
-    """Return (T, N) the corners in the orders in which the shape looks the same."""
-    count = len(shape.corners_m)
-    return np.asarray((np.array(shape.turns_onto_itself())[:, None] + np.arange(count)) % count)
-
-
-def _top_px(state: SolidState, shape: ReferenceShape) -> FloatArray:
-    return state.view.project(np.column_stack([shape.corners_m, np.full(len(shape.corners_m), state.height_m)]))
-
-
 def _score(task: _Task, state: SolidState) -> float:
     """Return px of outline that the picture has where a state puts it, as `_score_of`."""
     samples, support = outline_support(task.picture, task.shape, state)
@@ -331,7 +249,7 @@ def _score_of(task: _Task, state: SolidState, support: FloatArray, length: Float
     top = float((length[:corners] * (support[:corners] - _BARE_COST)).sum())
     lower = float((length[corners:] * np.maximum(support[corners:] - _BARE_COST, 0.0)).sum())
     roll = state.view.roll_rad
-    top_px = _top_px(state, task.shape)
+    top_px = upper_px(state, task.shape)
     unlikely = (
         _ROLL_COST * (roll / _ROLL_SIGMA_RAD) ** 2
         + _outside_share(top_px, task.box)

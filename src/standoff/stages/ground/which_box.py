@@ -12,8 +12,9 @@ from standoff.core.classes import Role, class_ids
 from standoff.core.homography import FloatArray
 from standoff.core.pose import View
 from standoff.core.types import Detections, ImageArray, NoGroundMap
+from standoff.stages.ground.solid_choice import Found
 from standoff.stages.ground.solid_observer import SolidObserver
-from standoff.stages.ground.solid_search import Found, search_solid
+from standoff.stages.ground.solid_search import search_solid
 
 WHICH = "one of several references is in sight, and nothing says which: give box_px, or show two of them"
 NONE_FITS = "the references in sight cannot be told apart"
