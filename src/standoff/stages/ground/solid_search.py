@@ -41,6 +41,9 @@ _ROLL_SIGMA_RAD = np.deg2rad(5.0)
 """Gimbals keep the horizon level; hands nearly so."""
 
 _BARE_COST, _ROLL_COST, _PATCHY = 0.45, 0.1, 0.33
+_HEIGHT_COST = 0.05
+"""A shadow's edge explains a solid twice as high as the real one, and explains more of the picture."""
+
 _FACE_RINGS = 5
 _REFINED = 10
 _FIT_PX = 5.0
@@ -252,6 +255,7 @@ def _score_of(task: _Task, state: SolidState, support: FloatArray, length: Float
     top_px = upper_px(state, task.shape)
     unlikely = (
         _ROLL_COST * (roll / _ROLL_SIGMA_RAD) ** 2
+        + _HEIGHT_COST * ((state.height_m - task.height.height_m) / task.height.sigma_m) ** 2
         + _outside_share(top_px, task.box)
         + _patchy_share(task.picture, top_px)
     )
