@@ -34,6 +34,8 @@ _ALIKE = 2.0
 """Cells: a strip that is narrower has one edge, and outlines that are nearer to each other are the same."""
 
 _PULL_SIGMA, _STEP_SIGMA = 3.0, 0.5
+"""Of an outline about its edges, px for each px of outline; and of a step, rad or distances to the solid."""
+
 _ROLL_SIGMA_RAD = np.deg2rad(5.0)
 _MAX_ROLL_RAD, _MIN_PITCH_RAD = np.deg2rad(30.0), np.deg2rad(5.0)
 _MAX_STEP = 0.3
