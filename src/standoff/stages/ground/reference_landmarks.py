@@ -14,7 +14,6 @@ from standoff.stages.ground.camera_belief import STATED, CameraBelief, Moment
 from standoff.stages.ground.lens_check import found_with_another_lens, refitted_lens
 from standoff.stages.ground.placement import Placement
 from standoff.stages.ground.pose_filter import Estimate
-from standoff.stages.ground.quadrilateral import NO_QUADRILATERAL
 from standoff.stages.ground.solid import SolidState
 from standoff.stages.ground.solid_choice import NOT_THERE
 from standoff.stages.ground.solid_fit import Belief
@@ -94,7 +93,7 @@ class ReferenceLandmarks:
         agrees = None if telemetry is None else partial(agrees_with_telemetry, telemetry=telemetry)
         found = solid.search(moment.gray, time_s, moment.detections, belief.lens, held=held, taken=taken, agrees=agrees)
         if isinstance(found, NoGroundMap):
-            if found.reason in (NOT_THERE, NO_QUADRILATERAL):
+            if found.reason == NOT_THERE:
                 self._doubt_lens(moment, belief, solid)
             return found.reason
         own = solid.belief(found)

@@ -1,14 +1,14 @@
 """Find the reference in a box of one picture when nothing is known of where the camera is.
 
-Of a solid with four corners, every quadrilateral that the edges in the box make is taken for the top and for the base,
-each way round and from both places from which a camera could see it so. One with other corners is laid over the edges
-from everywhere and pulled to those nearby (`solid_match`). The whole solid is then laid over the picture, and the place
-wins at which the picture has most of its edges.
+The solid is laid over the edges in the box from everywhere and pulled to those nearby (`solid_match`). Of one with four
+corners every quadrilateral that the edges make is taken for the top and for the base as well, each way round and from
+both places from which a camera could see it so. The whole solid is then laid over the picture at each of these places,
+and the one wins at which the picture has most of its edges.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -23,7 +23,6 @@ from standoff.stages.ground.edge_field import EdgeField
 from standoff.stages.ground.edges import Edges, between_pixels, canny, sobel_gradients
 from standoff.stages.ground.oriented import likely_quadrilaterals, noise_thresholds
 from standoff.stages.ground.outline import BOX_OUTSIDE, TOO_FEW_EDGES, undistorted_box
-from standoff.stages.ground.quadrilateral import NO_QUADRILATERAL
 from standoff.stages.ground.shape import ReferenceShape
 from standoff.stages.ground.solid import HEIGHT, STATE, SolidState
 from standoff.stages.ground.solid_choice import NOT_THERE, Candidate, Found, best_of, upper_px
@@ -41,7 +40,7 @@ _ROLL_SIGMA_RAD = np.deg2rad(5.0)
 """Gimbals keep the horizon level; hands nearly so."""
 
 _BARE_COST, _ROLL_COST, _PATCHY = 0.45, 0.1, 0.33
-_HEIGHT_COST = 0.05
+_HEIGHT_COST, _LEAST_HEIGHT_SIGMA_M = 0.05, 0.1
 """A shadow's edge explains a solid twice as high as the real one, and explains more of the picture."""
 
 _FACE_RINGS = 5
@@ -145,45 +144,51 @@ def _search(task: _Task, smoothing_px: float, agrees: Callable[[Belief], bool] |
     edges = _edges(task, smoothing_px)
     if isinstance(edges, NoGroundMap):
         return edges
-    states = _by_quadrilaterals(task, edges) if len(task.shape.corners_m) == 4 else _by_matching(task, edges)
-    if isinstance(states, NoGroundMap):
-        return states
+    states = _by_matching(task, edges)
+    if len(task.shape.corners_m) == 4:
+        states += _by_quadrilaterals(task, edges)
+    states = _ranked(task, states)
     candidates: list[Candidate] = []
     for state in states[: _REFINED * len(task.height.tried_m)]:
         if sum(one.believable for one in candidates) == _REFINED:
             break
         prior = _prior(state, task.camera, task.height)
         fit = fit_solid(task.gray, task.shape, prior, _FIT_PX, start=state)
-        if fit is not None and (score := _score_of(task, fit.state, fit.support, fit.length_px)) > 0:
+        if fit is not None and (score := _score_of_fit(task, fit)) > 0:
             believable = _believable(fit, task.shape) and _expected(fit, prior, task.shape)
             candidates.append(Candidate(score, Found(fit, prior), believable))
     return best_of(candidates, task.shape, agrees)
 
 
-def _by_quadrilaterals(task: _Task, edges: Edges) -> list[SolidState] | NoGroundMap:
-    """Return the states that quadrilaterals of edges speak for, the best first."""
+def _score_of_fit(task: _Task, fit: SolidFit) -> float:
+    """Return px of outline that the picture has where a fit puts it, less what its height costs."""
+    off = (fit.state.height_m - task.height.height_m) / max(task.height.sigma_m, _LEAST_HEIGHT_SIGMA_M)
+    around_px = fit.length_px[: len(task.shape.corners_m)].sum()
+    return _score_of(task, fit.state, fit.support, fit.length_px) - _HEIGHT_COST * off**2 * float(around_px)
+
+
+def _ranked(task: _Task, states: Sequence[SolidState]) -> list[SolidState]:
+    """Return states in the order of how much of them the picture has."""
+    scores = np.array([_score(task, state) for state in states])
+    return [states[k] for k in np.argsort(-scores, kind="stable")]
+
+
+def _by_quadrilaterals(task: _Task, edges: Edges) -> list[SolidState]:
+    """Return the states that quadrilaterals of edges speak for."""
     outlines = likely_quadrilaterals(edges, undistorted_box(task.box, task.camera.camera), _QUADRILATERALS)
     camera, heights_m = task.camera.camera, task.height.tried_m
     states = [state for outline in outlines for state in states_of(outline, task.shape, camera, heights_m)]
-    if not states:
-        return NoGroundMap(NO_QUADRILATERAL)
-    scores = [_score(task, state) for state in states]
-    leading = [states[k] for k in np.argsort(-np.array(scores), kind="stable")[:_MIXED]]
-    mixed = [other for state in leading for other in mixed_states(state, task.shape)]
-    states += mixed
-    scores += [_score(task, state) for state in mixed]
-    return [states[k] for k in np.argsort(-np.array(scores), kind="stable")]
+    leading = _ranked(task, states)[:_MIXED]
+    return states + [other for state in leading for other in mixed_states(state, task.shape)]
 
 
 def _by_matching(task: _Task, edges: Edges) -> list[SolidState]:
-    """Return the states whose outlines come to rest on edges, the best first."""
+    """Return the states whose outlines come to rest on edges."""
     camera = task.camera.camera
     field = EdgeField(edges, undistorted_box(task.box, camera))
     detected = undistorted_box(task.detected, camera)
     # Heights adapt, so that every other one will do to begin with.
-    states = matching_states(field, detected, task.shape, camera, task.height.tried_m[::2], task.height.sigma_m)
-    scores = np.array([_score(task, state) for state in states])
-    return [states[k] for k in np.argsort(-scores, kind="stable")]
+    return matching_states(field, detected, task.shape, camera, task.height.tried_m[::2], task.height.sigma_m)
 
 
 def _edges(task: _Task, smoothing_px: float) -> Edges | NoGroundMap:
@@ -255,7 +260,6 @@ def _score_of(task: _Task, state: SolidState, support: FloatArray, length: Float
     top_px = upper_px(state, task.shape)
     unlikely = (
         _ROLL_COST * (roll / _ROLL_SIGMA_RAD) ** 2
-        + _HEIGHT_COST * ((state.height_m - task.height.height_m) / task.height.sigma_m) ** 2
         + _outside_share(top_px, task.box)
         + _patchy_share(task.picture, top_px)
     )
