@@ -57,7 +57,7 @@ def scale_error(clip: Path) -> tuple[float, float] | str:
 
 def _motion(then: View, now: View, keyframe_s: float) -> CameraMotion:
     forth: FloatArray = now.plane_to_pinhole() @ homography.invert(then.plane_to_pinhole())
-    return CameraMotion(forth / np.linalg.norm(forth), 1e-12 * np.eye(9), keyframe_s, then.camera)
+    return CameraMotion(forth / np.linalg.norm(forth), np.zeros((9, 9)), keyframe_s, then.camera)
 
 
 def main() -> None:
