@@ -161,9 +161,7 @@ def _work(
 
 
 @contextmanager
-def open_shooter(
-    plan: Plan, site: Site | None = None
-) -> Generator[Callable[[tuple[int, float]], Shot], None, None]:
+def open_shooter(plan: Plan, site: Site | None = None) -> Generator[Callable[[tuple[int, float]], Shot], None, None]:
     """Give a function from a frame's index and time to the frame; the site is built where it is not given."""
     with Studio(site or build_site(plan)) as studio:
         yield lambda job: studio.shoot(*job)
