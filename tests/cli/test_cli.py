@@ -103,7 +103,7 @@ def test_the_record_says_which_telemetry_was_used_and_where_it_does_not_fit(
 
 
 def test_json_prints_the_record_and_nothing_else(call: Call, video: Path, site: Path, tmp_path: Path) -> None:
-    code, out, err = call("run", video, "--config", site, "--out", tmp_path / "out", "--json")
+    code, out, err = call("run", video, "--config", site, "--out", tmp_path / "out", "--json", "--outputs", "frames")
     assert (code, err) == (0, "")
     assert json.loads(out)["status"] == "complete"
 
@@ -129,7 +129,8 @@ def test_start_stop_and_every_choose_the_frames(call: Call, video: Path, site: P
 def test_a_run_in_which_nothing_could_be_measured_is_not_a_success(
     call: Call, video: Path, site: Path, tmp_path: Path
 ) -> None:
-    code, _, err = call("run", video, "--config", site, "--ground", "none", "--out", tmp_path / "out")
+    words = ("--ground", "none", "--outputs", "frames,proximity")
+    code, _, err = call("run", video, "--config", site, "--out", tmp_path / "out", *words)
     assert code == 1
     assert "no frame could be measured" in err
     table = pq.read_table(tmp_path / "out" / "proximity.parquet").to_pydict()
@@ -251,7 +252,7 @@ def test_a_truncated_video_keeps_what_was_read_and_says_that_it_is_not_all(
     whole = make_video(tmp_path / "whole.avi", 200).read_bytes()
     cut = tmp_path / "cut.avi"
     cut.write_bytes(whole[: len(whole) // 2])
-    code, _, err = call("run", cut, "--config", site, "--out", tmp_path / "out", "--quiet")
+    code, _, err = call("run", cut, "--config", site, "--out", tmp_path / "out", "--quiet", "--outputs", "frames")
     assert code == 2
     assert "frames" in err and err.count("\n") == 1
     record = json.loads((tmp_path / "out" / "run.json").read_text())
@@ -292,7 +293,7 @@ def test_a_reference_box_outside_the_picture_is_told_before_anything_is_written(
 def test_the_reference_box_is_for_the_first_frame_that_is_read(
     call: Call, video: Path, site: Path, tmp_path: Path
 ) -> None:
-    words = ("--ground", "square:2", "--reference-box", "100,100,150,150", "--start", 1.0)
+    words = ("--ground", "square:2", "--reference-box", "100,100,150,150", "--start", 1.0, "--outputs", "")
     code, _, err = call("run", video, "--config", site, "--out", tmp_path / "out", *words)
     assert (code, "no frame could be measured" in err) == (1, True)
 
@@ -336,7 +337,7 @@ def test_a_polygon_on_the_command_line_is_the_reference(
 def test_an_output_of_ones_own_that_cannot_be_made_leaves_the_folder_as_it_was(
     call: Call, video: Path, site: Path, tmp_path: Path, factory: str
 ) -> None:
-    assert call("run", video, "--config", site, "--out", tmp_path / "out", "--quiet")[0] == 0
+    assert call("run", video, "--config", site, "--out", tmp_path / "out", "--quiet", "--outputs", "")[0] == 0
     before = (tmp_path / "out" / "run.json").read_bytes()
     settings = yaml.safe_load(site.read_text()) | {"extra_outputs": {"siren": {"factory": factory}}}
     site.write_text(yaml.safe_dump(settings), encoding="utf-8")

@@ -28,33 +28,30 @@ def drawn(drawn_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     return clip
 
 
-def test_the_demo_writes_all_outputs_and_prints_how_far_off_it_is(drawn: Clip, tmp_path: Path, call: Call) -> None:
-    out = tmp_path / "out"
-    code, said, _ = call("demo", "--out", out, "--json", tmp_path / "found.json")
-    assert code == 0
-    made = {path.name for path in out.iterdir()}
-    assert made >= {"report.html", "annotated.mp4", "run.json", "tracks.parquet", "proximity.parquet", "hazards.jsonl"}
-    for words in ("complete", "recall", "MADE", " of 2 recognised", "False warnings", "report.html", "annotated.mp4"):
-        assert words in said
-    assert "the paper's method" in said and "frames with a map" in said
-    found = json.loads((tmp_path / "found.json").read_text())
-    assert found["frames"] == drawn.frame_count
-    assert {one["kind"] for one in found["encounters"]} == {"breach"}
-
-
 @pytest.fixture(autouse=True)
 def nobody_watches_the_scale(monkeypatch: pytest.MonkeyPatch) -> None:
     """The drawn clip's people and machines have no height: the watch over the scale would refuse its metres."""
     monkeypatch.setattr("standoff.config.build.ScaleWatch", lambda inner, _camera: inner)
 
 
-def test_the_demo_runs_defaults_and_the_papers_method_on_the_same_boxes(
-    drawn: Clip, tmp_path: Path, call: Call
-) -> None:
+def test_the_demo_writes_all_outputs_and_prints_how_far_off_it_is(drawn: Clip, tmp_path: Path, call: Call) -> None:
+    """It runs the defaults and the paper's method on the same boxes; an earlier run is kept unless it may go."""
     out = tmp_path / "out"
-    code, said, _ = call("demo", "--out", out, "--json", "-")
+    out.mkdir()
+    (out / "run.json").write_text("{}")
+    code, _, error = call("demo", "--out", out)
+    assert (code, error.count("\n")) == (2, 1)
+    assert "run.json" in error and "--overwrite" in error
+    code, said, _ = call("demo", "--out", out, "--overwrite", "--json", tmp_path / "found.json")
     assert code == 0
-    found, record = json.loads(said), json.loads((out / "run.json").read_text())
+    made = {path.name for path in out.iterdir()}
+    assert made >= {"report.html", "annotated.mp4", "run.json", "tracks.parquet", "proximity.parquet", "hazards.jsonl"}
+    for words in ("complete", "recall", "MADE", " of 2 recognised", "False warnings", "report.html", "annotated.mp4"):
+        assert words in said
+    assert "the paper's method" in said and "frames with a map" in said
+    found, record = json.loads((tmp_path / "found.json").read_text()), json.loads((out / "run.json").read_text())
+    assert found["frames"] == drawn.frame_count
+    assert {one["kind"] for one in found["encounters"]} == {"breach"}
     assert record["settings"]["ground"]["reference"]["params"]["method"] == "fused"
     assert record["settings"]["locate"]["anchor"] == "bottom_centre"
     # What lies on the square for a moment hides it from the paper's method, not from one that follows the picture.
@@ -63,13 +60,7 @@ def test_the_demo_runs_defaults_and_the_papers_method_on_the_same_boxes(
     assert found["map_only"]["level"]["p95_m"] < found["paper"]["map_only"]["level"]["p95_m"]
 
 
-def test_machines_get_only_json(drawn: Clip, tmp_path: Path, call: Call) -> None:
-    code, said, _ = call("demo", "--out", tmp_path / "out", "--json", "-")
-    assert code == 0
-    assert json.loads(said)["frames"] == drawn.frame_count
-
-
-def test_an_earlier_demo_can_be_replayed(
+def test_an_earlier_demo_can_be_replayed_and_machines_get_only_json(
     drawn: Clip, tmp_path: Path, call: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     first = record_truth(drawn.folder, tmp_path / "first")
@@ -78,16 +69,6 @@ def test_an_earlier_demo_can_be_replayed(
     code, said, _ = call(*words)
     assert (code, json.loads(said)["frames"]) == (0, drawn.frame_count)
     assert call(*words, "--model", "site")[0] == 2
-
-
-def test_an_earlier_run_is_kept_unless_it_may_be_replaced(drawn: Clip, tmp_path: Path, call: Call) -> None:
-    out = tmp_path / "out"
-    out.mkdir()
-    (out / "run.json").write_text("{}")
-    code, _, error = call("demo", "--out", out)
-    assert (code, error.count("\n")) == (2, 1)
-    assert "run.json" in error and "--overwrite" in error
-    assert call("demo", "--out", out, "--overwrite")[0] == 0
 
 
 @pytest.mark.parametrize("lost", ["video.mp4", "truth.parquet", "reference.yaml"])

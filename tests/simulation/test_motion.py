@@ -108,9 +108,10 @@ def test_front_wheels_point_along_their_own_way() -> None:
     ahead = np.column_stack([np.cos(motion.heading_rad), np.sin(motion.heading_rad)])
     limits = MOBILITY["vehicle"]
     front_m = motion.xy_m + (limits.pivot_share + limits.wheelbase_share) * 4.8 * ahead
-    velocity = np.gradient(front_m, STEP_S, axis=0)
+    velocity: FloatArray = np.gradient(front_m, STEP_S, axis=0)
     moving = np.linalg.norm(velocity, axis=1) > 0.3
-    course_rad = np.unwrap(np.arctan2(velocity[:, 1], velocity[:, 0]))
+    east, north = velocity.T
+    course_rad = np.unwrap(np.arctan2(north, east))
     steered_deg = np.rad2deg(course_rad - motion.heading_rad)
     np.testing.assert_allclose(steered_deg[moving], motion.joints["steer_deg"][moving], atol=0.05)
 

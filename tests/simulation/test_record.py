@@ -65,10 +65,9 @@ def test_the_stationary_clip_keeps_its_distance_exactly(clip: Path) -> None:
     np.testing.assert_allclose(pairs["centre_m"], 15.0, rtol=GEOMETRY_REL)
 
 
-@pytest.mark.parametrize("processes", [1, 2])
-def test_the_same_seed_gives_the_same_truth_bit_for_bit(clip: Path, tmp_path: Path, processes: int) -> None:
+def test_the_same_seed_gives_the_same_truth_bit_for_bit_in_other_processes(clip: Path, tmp_path: Path) -> None:
     again = tmp_path / "again"
-    record_clip(_plan(), again, processes=processes)
+    record_clip(_plan(), again, processes=2)
     for name in _FILES - {"video.mp4"}:
         assert (again / name).read_bytes() == (clip / name).read_bytes(), name
 

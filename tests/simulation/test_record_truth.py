@@ -47,8 +47,10 @@ def pair(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def _looks_deg(clip: Path) -> FloatArray:
     """Return where the camera looks in each frame, clockwise from north."""
-    forward = np.array(pq.read_table(clip / "frames.parquet")["site_to_camera"].to_pylist())[:, 6:8]
-    return np.asarray(np.rad2deg(np.arctan2(forward[:, 0], forward[:, 1])))
+    site_to_camera = pq.read_table(clip / "frames.parquet")["site_to_camera"].to_pylist()
+    forward: FloatArray = np.array(site_to_camera)[:, 6:8]
+    east, north = forward.T
+    return np.asarray(np.rad2deg(np.arctan2(east, north)))
 
 
 def test_a_clip_without_pictures_has_every_table_and_no_film(pair: Path) -> None:

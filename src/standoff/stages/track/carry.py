@@ -44,11 +44,13 @@ def _move(rows: MotionArray, which: IntArray, centre: FloatArray, jacobian: Floa
     scale = np.sqrt(np.abs(np.linalg.det(jacobian)))[:, None]
     moved["box"][:, :2] = centre
     moved["box"][:, 2:] *= scale
-    moved["rate"][:, :2] = np.einsum("nij,nj->ni", jacobian, moved["rate"][:, :2])
-    moved["rate"][:, 2:] *= scale
+    rate: FloatArray = moved["rate"]
+    rate[:, :2] = np.einsum("nij,nj->ni", jacobian, rate[:, :2])
+    rate[:, 2:] *= scale
     # Variances along the picture's axes only are kept: a turn mixes them, and what it correlates is dropped.
     mixing = jacobian**2
     for name in ("box_variance", "box_rate_covariance", "rate_variance"):
-        moved[name][:, :2] = np.einsum("nij,nj->ni", mixing, moved[name][:, :2])
-        moved[name][:, 2:] *= scale**2
+        variance: FloatArray = moved[name]
+        variance[:, :2] = np.einsum("nij,nj->ni", mixing, variance[:, :2])
+        variance[:, 2:] *= scale**2
     rows[which] = moved

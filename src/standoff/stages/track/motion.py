@@ -114,12 +114,15 @@ def correct(rows: MotionArray, which: IntArray, boxes: FloatArray, params: Track
     """
     seen = rows[which]
     noise = (params.box_noise * _sizes_px(boxes)) ** 2
-    total = seen["box_variance"] + noise
-    innovation = boxes - seen["box"]
-    gain, rate_gain = seen["box_variance"] / total, seen["box_rate_covariance"] / total
+    box: FloatArray = seen["box"]
+    variance: FloatArray = seen["box_variance"]
+    covariance: FloatArray = seen["box_rate_covariance"]
+    total = variance + noise
+    innovation = boxes - box
+    gain, rate_gain = variance / total, covariance / total
     seen["box"] += gain * innovation
     seen["rate"] += rate_gain * innovation
-    seen["rate_variance"] -= rate_gain * seen["box_rate_covariance"]
+    seen["rate_variance"] -= rate_gain * covariance
     seen["box_rate_covariance"] *= 1.0 - gain
     seen["box_variance"] *= 1.0 - gain
     rows[which] = seen
