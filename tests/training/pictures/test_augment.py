@@ -148,3 +148,18 @@ def test_without_any_chance_a_picture_stays_as_it_is() -> None:
     sample = make_sample(np.random.default_rng(0), [picture], lambda _: 0, _load, SIZE_PX, params)
     np.testing.assert_array_equal(sample.image, draw_ellipses(picture.xyxy_px))
     np.testing.assert_allclose(sample.xyxy_px, picture.xyxy_px + 0.5, rtol=GEOMETRY_REL)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_ground_points_go_along_with_their_boxes(seed: int) -> None:
+    """Marked in the middle of each box, they are there in every sample where the box is whole."""
+    data = [replace(picture, foot_px=(picture.xyxy_px[:, :2] + picture.xyxy_px[:, 2:]) / 2) for picture in _drawn(seed)]
+    params = replace(CLEAN, mosaic=0.5, any_rotation_sources=("drawn",))
+    sample = make_sample(np.random.default_rng(seed), data, _uniform(data), _load, _SIZE_PX, params)
+    middle_px = (sample.xyxy_px[:, :2] + sample.xyxy_px[:, 2:]) / 2
+    sides_px = sample.xyxy_px[:, 2:] - sample.xyxy_px[:, :2]
+    # What is cut off keeps its point, which is at most half a whole box from what is left.
+    assert (np.abs(sample.foot_px - middle_px) < 400).all()
+    near = np.abs(sample.foot_px - middle_px) < 0.01 * sides_px
+    assert near.all(axis=1).sum() >= 0.3 * len(near)
+    assert np.isnan(_make(seed, params).foot_px).all(), "unmarked points stay unknown"
