@@ -46,7 +46,8 @@ class DatasetPlan:
         layout: Of the annotations.
         held_out: Share of scenes for each of val and test.
         seed: Of everything random.
-        excavator_mesh: Folder of mesh parts for a third of the excavators, or None.
+        excavator_mesh: Folder of mesh parts for some of the excavators, or None.
+        mesh_share: Of the scenes whose excavators are made of them.
 
     Raises:
         ConfigError: A size or seed out of range.
@@ -60,6 +61,7 @@ class DatasetPlan:
     held_out: float
     seed: int
     excavator_mesh: Path | None = None
+    mesh_share: float = 1 / 3
 
     def __post_init__(self) -> None:
         check_seed(self.seed)
@@ -157,7 +159,7 @@ def _draw_plan(rng: np.random.Generator, plan: DatasetPlan) -> Plan:
         furnished_m=40.0,
         reference_offset_m=(float(rng.normal(0.0, 6.0)), float(rng.normal(0.0, 6.0))),
     )
-    mesh = plan.excavator_mesh if rng.random() < 1 / 3 else None
+    mesh = plan.excavator_mesh if rng.random() < plan.mesh_share else None
     return Plan("dataset", preset, int(rng.integers(MAX_SEED)), excavator_mesh=mesh)
 
 

@@ -52,9 +52,9 @@ def detect_pictures(
                 pixels = torch.from_numpy(blob).to(device).contiguous(memory_format=torch.channels_last)
                 heads = network(pixels)
             # bfloat16 has 8 bits: a box at 640 px would be rounded to 4.
-            rows = decoded.decode(tuple(head.float() for head in heads))[0].cpu().numpy()
+            boxes, _ = decoded.decode(tuple(head.float() for head in heads))
         readable.append(picture)
-        found.append(read_rows(rows, letterbox))
+        found.append(read_rows(boxes[0].cpu().numpy(), letterbox))
     return readable, found
 
 
