@@ -23,9 +23,9 @@ OUTSIDE_MAP = "outside the ground map"
 class Locator:
     """Place each track of one stream on the ground.
 
-    One point of the box stands for the entity and is taken to lie on the ground plane. For a machine
-    seen from above the bottom of the box is its near side, not its middle: the covariance covers the
-    error of the box, not this.
+    One point stands for the entity and is taken to lie on the ground plane: the detector's own ground point, whose
+    error it states, or where it gives none a point of the box. For a machine seen from above the bottom of the box is
+    its near side, not its middle: there the covariance covers the error of the box, not this.
 
     Args:
         params: Settings; the defaults when left out.
@@ -48,7 +48,7 @@ class Locator:
 
         Returns:
             Row i belongs to track i. A row is invalid, with its reason, when there is no map, when the
-            box may go on outside the picture so that its anchor was not seen, and when the anchor is
+            box may go on outside the picture so that its anchor was not seen (a ground point knows), and when it is
             outside the lens model, at or beyond the horizon, or outside the map's polygon. Velocity
             comes from observed positions only, not from coasting ones, and is NaN where invalid.
         """
@@ -59,14 +59,15 @@ class Locator:
             covariance_m2, map_factor_m = np.full((len(tracks), 2, 2), np.nan), np.full((len(tracks), 2, 10), np.nan)
             reason = np.full(len(tracks), f"no ground map: {ground.reason}", dtype=object)
         else:
-            points_px = ground.undistorted(self._anchors(tracks))
-            variance_px2 = self._anchor_variance(tracks, coasted_s)
+            seen_px, seen_covariance_px2 = self._standing(tracks, coasted_s)
+            points_px = ground.undistorted(seen_px)
             root = self._root(ground)
-            reason = self._reasons(tracks, ground, points_px, horizon_margin(ground, root, points_px, variance_px2))
+            margin = horizon_margin(ground, root, points_px, seen_covariance_px2)
+            reason = self._reasons(tracks, ground, points_px, margin)
             points_px = np.where((reason == "")[:, None], points_px, np.nan)
             xy_m, _ = homography.apply(ground.image_to_ground, points_px)
             map_factor_m = map_jacobian(ground, points_px) @ root
-            covariance_m2 = own_covariance(ground, points_px, variance_px2)
+            covariance_m2 = own_covariance(ground, points_px, seen_covariance_px2)
             covariance_m2 += map_factor_m @ map_factor_m.transpose(0, 2, 1)
         valid = np.isfinite(points_px).all(axis=1)
         velocity_mps = self._velocities.update(time_s, tracks.track_id, xy_m, valid & tracks.observed)
@@ -97,9 +98,23 @@ class Locator:
         }
         return time_s - np.array([*self._observed_s.values()], dtype=np.float64)
 
+    def _has_point(self, tracks: Tracks) -> BoolArray:
+        """Tell (M,) which tracks are placed by their own ground point."""
+        return np.isfinite(tracks.foot_px).all(axis=1) & (self._params.anchor == "ground_point")
+
+    def _standing(self, tracks: Tracks, coasted_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return (M, 2) the point of each track that stands on the ground, as seen, and its (M, 2, 2) covariance."""
+        own = self._has_point(tracks)
+        longer_px = (tracks.xyxy_px[:, 2:] - tracks.xyxy_px[:, :2]).max(axis=1, initial=0.0)
+        coasting_px2 = (self._params.coast_sigma_per_s * longer_px * coasted_s) ** 2
+        points_px = np.where(own[:, None], tracks.foot_px, self._anchors(tracks))
+        anchor_px2 = self._anchor_variance(tracks)[:, :, None] * np.eye(2)
+        covariance_px2 = np.where(own[:, None, None], tracks.foot_covariance_px2, anchor_px2)
+        return points_px, covariance_px2 + coasting_px2[:, None, None] * np.eye(2)
+
     def _anchors(self, tracks: Tracks) -> FloatArray:
         left, top, right, bottom = tracks.xyxy_px.T
-        down = bottom if self._params.anchor == "bottom_centre" else (top + bottom) / 2.0
+        down = (top + bottom) / 2.0 if self._params.anchor == "box_centre" else bottom
         return np.column_stack([(left + right) / 2.0, down])
 
     def _edge_sigma(self, tracks: Tracks) -> FloatArray:
@@ -107,12 +122,10 @@ class Locator:
         sides_px = tracks.xyxy_px[:, 2:] - tracks.xyxy_px[:, :2]
         return np.maximum(self._params.edge_sigma_fraction * sides_px, self._params.edge_sigma_floor_px)
 
-    def _anchor_variance(self, tracks: Tracks, coasted_s: FloatArray) -> FloatArray:
+    def _anchor_variance(self, tracks: Tracks) -> FloatArray:
         """Return (M, 2) variance of the anchor: a mean of two independent edges has half that of one."""
-        edges = np.array([2.0, 1.0 if self._params.anchor == "bottom_centre" else 2.0])
-        longer_px = (tracks.xyxy_px[:, 2:] - tracks.xyxy_px[:, :2]).max(axis=1, initial=0.0)
-        coasting = (self._params.coast_sigma_per_s * longer_px * coasted_s) ** 2
-        variance_px2: FloatArray = self._edge_sigma(tracks) ** 2 / edges + coasting[:, None]
+        edges = np.array([2.0, 2.0 if self._params.anchor == "box_centre" else 1.0])
+        variance_px2: FloatArray = self._edge_sigma(tracks) ** 2 / edges
         return variance_px2
 
     def _cut_off(self, tracks: Tracks, size_px: tuple[int, int]) -> BoolArray:
@@ -122,7 +135,8 @@ class Locator:
         touches_low = tracks.xyxy_px[:, :2] < margin_px - 0.5
         touches_high = tracks.xyxy_px[:, 2:] > np.array(size_px) - 0.5 - margin_px
         cut_off: BoolArray = touches_low[:, 0] | touches_high.any(axis=1)
-        return cut_off if self._params.anchor == "bottom_centre" else cut_off | touches_low[:, 1]
+        cut_off |= touches_low[:, 1] & (self._params.anchor == "box_centre")
+        return cut_off & ~self._has_point(tracks)
 
     def _reasons(self, tracks: Tracks, ground: GroundMap, points_px: FloatArray, margin: FloatArray) -> TextArray:
         """Return (M,) why each track cannot be located, the first cause that applies; empty where it can."""

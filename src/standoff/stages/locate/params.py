@@ -9,7 +9,7 @@ from typing_extensions import Doc
 
 from standoff.core.classes import CLASS_BY_NAME
 
-Anchor = Literal["bottom_centre", "box_centre"]
+Anchor = Literal["ground_point", "bottom_centre", "box_centre"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,10 +19,11 @@ class LocateParams:
     anchor: Annotated[
         Anchor,
         Doc(
-            "The point of the box that is taken to touch the ground. The paper takes the centre of the box, which "
-            "places a tall entity behind where it stands."
+            "The point that is taken to stand on the ground: the detector's own ground point, or where it gives none "
+            "the bottom centre of the box; or always the bottom centre; or the centre of the box, as in the paper, "
+            "which places a tall entity behind where it stands."
         ),
-    ] = "bottom_centre"
+    ] = "ground_point"
     edge_sigma_fraction: Annotated[
         float,
         Ge(0),
