@@ -7,6 +7,7 @@ camera is and how it is turned, and the height of the ground under what is marke
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -71,6 +72,29 @@ def read_views(path: Path) -> dict[str, GroundView]:
                 fix="write the data set again with `standoff simulate`, or remove the file",
             ) from error
     return views
+
+
+def views_of(pictures: Sequence[Path]) -> dict[int, GroundView]:
+    """Return how pictures show the ground, by their position, where the sets that they belong to tell.
+
+    Args:
+        pictures: Files, in `images` of their sets.
+
+    Raises:
+        DataError: A set's file of views is damaged.
+    """
+    read: dict[Path, dict[str, GroundView]] = {}
+    found = {}
+    for position, path in enumerate(pictures):
+        images = next((parent for parent in path.parents if parent.name == "images"), None)
+        if images is None:
+            continue
+        file = images.parent / VIEWS_FILE
+        if file not in read:
+            read[file] = read_views(file) if file.is_file() else {}
+        if path.name in read[file]:
+            found[position] = read[file][path.name]
+    return found
 
 
 def _ground_view(entry: dict[str, Any]) -> GroundView:
