@@ -152,13 +152,13 @@ def _joined(models: Sequence[onnx.ModelProto], factors: Sequence[_Floats]) -> on
     if any(widths):
         points = [f"part{index}_{POINTS_NAME}" for index in range(len(models))]
         missing = [index for index, width in enumerate(widths) if not width]
-        columns = max(widths)[0]
+        point_columns = max(widths)[0]
         tensors += [
-            onnx.numpy_helper.from_array(np.full((1, rows[index], columns), np.nan, np.float32), points[index])
+            onnx.numpy_helper.from_array(np.full((1, rows[index], point_columns), np.nan, np.float32), points[index])
             for index in missing
         ]
         nodes.append(onnx.helper.make_node("Concat", points, [POINTS_NAME], axis=1))
-        results.append(_result(POINTS_NAME, sum(rows), columns))
+        results.append(_result(POINTS_NAME, sum(rows), point_columns))
     graph = onnx.helper.make_graph(nodes, "joined", list(first.input), results, tensors)
     return onnx.helper.make_model(graph, opset_imports=_used_opsets(models[0]), ir_version=models[0].ir_version)
 

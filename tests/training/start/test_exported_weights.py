@@ -17,9 +17,9 @@ from standoff.training.architectures.yolov3 import YOLOV3_ANCHORS_PX
 from standoff.training.darknet.cfg import parse_cfg, read_cfg
 from standoff.training.darknet.export import export_darknet
 from standoff.training.darknet.network import DarknetNetwork
-from standoff.training.darknet.weights import load_weights
+from standoff.training.darknet.weights import load_weights, save_weights
 from standoff.training.join import join_models
-from standoff.training.start.exported_weights import gives_points, read_exported
+from standoff.training.start.exported_weights import gives_points, is_folded, read_exported
 from standoff.training.start.starting_point import fill_network
 
 MakeFiles = Callable[[str, int], DarknetFiles]
@@ -69,11 +69,15 @@ def test_of_a_joined_file_the_part_of_the_same_layers_is_taken(make_darknet_file
         torch.testing.assert_close(_heads(found), _heads(expected), rtol=1e-4, atol=1e-4)
 
 
-def test_the_shipped_detector_is_a_start_and_its_normalisations_are_told_to_stay() -> None:
+def test_the_shipped_detector_is_a_start_and_its_normalisations_are_told_to_stay(tmp_path: Path) -> None:
     cfg = parse_cfg(pointed_cfg(efficientnet_lite0_cfg(2, 64, 64)), "own.cfg")
     network, transferred = fill_network(cfg, ("worker", "crane"), find_model("site"), 0)
     assert transferred.folded and transferred.fresh == ()
     assert transferred.class_sources == (("worker",), ())
+    fresh, _ = fill_network(cfg, ("worker", "crane"), None, 0)
+    assert not is_folded(fresh)
+    save_weights(network, tmp_path / "on.weights")
+    assert fill_network(cfg, ("worker", "crane"), tmp_path / "on.weights", 0)[1].folded, "in Darknet's format, too"
     assert len(transferred.resized) == 3
     assert all(torch.isfinite(head).all() for head in _heads(network))
 

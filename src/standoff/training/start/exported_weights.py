@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 import onnx
 import torch
+from torch import nn
 
 from standoff.core.errors import ModelError
 from standoff.stages.detect.model_card import POINTS_NAME, ModelCard
@@ -70,6 +71,17 @@ def read_exported(cfg: DarknetCfg, path: Path) -> tuple[DarknetNetwork, tuple[st
         found=f"another one in {path.name}",
         fix="train with the architecture that the detector was made with",
     )
+
+
+def is_folded(network: DarknetNetwork) -> bool:
+    """Tell whether a network has normalisations that came without statistics, from an export."""
+    norms = [block.normalization for _, block in network.convolutions() if block.normalization is not None]
+    return any(bool((norm.running_var == _unit_variance(norm)).all()) for norm in norms if norm.running_var is not None)
+
+
+def _unit_variance(norm: nn.BatchNorm2d) -> float:
+    """Return the variance with which a normalisation divides by 1: a shade under the 1 of a fresh one."""
+    return float(np.float32(1.0 - norm.eps))
 
 
 def _parts(model: onnx.ModelProto) -> list[list[_Kernel]]:
@@ -128,6 +140,6 @@ def _fill(block: ConvolutionBlock, kernel: npt.NDArray[np.float32], bias: npt.ND
             return
         assert norm.running_mean is not None and norm.running_var is not None
         norm.running_mean.zero_()
-        norm.running_var.fill_(1.0 - norm.eps)
+        norm.running_var.fill_(_unit_variance(norm))
         norm.weight.fill_(1.0)
         norm.bias.copy_(torch.from_numpy(bias))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,7 @@ from standoff.training.darknet.shapes import layer_strides
 from standoff.training.pictures.batches import open_batches
 from standoff.training.run.params import TrainParams
 from standoff.training.start.anchors import cluster_anchors, spread_over_heads
-from standoff.training.start.exported_weights import EXPORTED_SUFFIX, gives_points
+from standoff.training.start.exported_weights import EXPORTED_SUFFIX, gives_points, is_folded
 from standoff.training.start.initial_weights import head_convolutions, initialize_layers
 from standoff.training.start.transfer import Transferred, transfer_weights
 
@@ -140,8 +141,11 @@ def fill_network(
         return network, Transferred("nothing", (), (), layers)
     source_cfg, source_names = _beside(weights)
     if weights.suffix == EXPORTED_SUFFIX or not (source_cfg.is_file() and source_names.is_file()):
-        return network, transfer_weights(network, weights, classes=classes, generator=generator)
-    source_classes = read_names(source_names, read_cfg(source_cfg))
-    return network, transfer_weights(
-        network, weights, source_cfg, classes=classes, source_classes=source_classes, generator=generator
-    )
+        transferred = transfer_weights(network, weights, classes=classes, generator=generator)
+    else:
+        source_classes = read_names(source_names, read_cfg(source_cfg))
+        transferred = transfer_weights(
+            network, weights, source_cfg, classes=classes, source_classes=source_classes, generator=generator
+        )
+    # Also what went on from an export, in Darknet's format since, is still without statistics.
+    return network, replace(transferred, folded=is_folded(network))

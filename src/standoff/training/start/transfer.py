@@ -41,7 +41,7 @@ class Transferred:
         fresh: Initialised.
         class_sources: Of each class, what it started from in the resized heads: names, or numbers where the source's
             classes have no names; empty for a class that starts afresh.
-        folded: The source's batch normalisations are folded into its kernels: there are no statistics to go on with.
+        folded: The source's batch normalisations were folded into its kernels: there are no statistics to go on with.
     """
 
     source: str
@@ -79,7 +79,7 @@ def transfer_weights(
     if weights.suffix == EXPORTED_SUFFIX:
         trained, names = read_exported(network.cfg, weights)
         started = _continued(network, trained, len(trained.convolutions()), (classes, names), generator)
-        return replace(started, source=f"the detector in {weights.name}", folded=True)
+        return replace(started, source=f"the detector in {weights.name}")
     if weights.suffix in _TORCH_SUFFIXES:
         filled = fill_efficientnet_lite0(network, weights)
         return _started(network, f"EfficientNet-lite0's backbone, in {weights.name}", filled, generator)
