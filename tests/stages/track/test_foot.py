@@ -24,7 +24,8 @@ def _seen(centre_px: FloatArray, foot_px: FloatArray | None, sigma_px: float = 2
 
 
 def _foot(centre_px: FloatArray) -> FloatArray:
-    return centre_px + _AT * _SIZE_PX
+    foot_px: FloatArray = centre_px + _AT * _SIZE_PX
+    return foot_px
 
 
 @pytest.mark.parametrize("seed", range(4))

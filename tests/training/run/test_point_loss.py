@@ -23,7 +23,8 @@ def _minimum(residual: Tensor, learns_mean: bool) -> tuple[float, float]:
     descent = torch.optim.Adam([shift, log_sigma] if learns_mean else [log_sigma], lr=0.08)
     for _ in range(250):
         descent.zero_grad()
-        point_loss(residual + shift, log_sigma.expand(len(residual), 2)).div(len(residual)).backward()
+        loss = point_loss(residual + shift, log_sigma.expand(len(residual), 2)) / len(residual)
+        torch.autograd.backward(loss)
         descent.step()
     return shift.detach().mean().item(), log_sigma.detach().mean().item()
 
@@ -53,7 +54,7 @@ def test_what_nobody_marked_has_no_gradient_and_the_loss_is_never_negative(seed:
     log_sigma = torch.empty(50, 2).uniform_(*LOG_SIGMA, generator=generator).requires_grad_()
     raw = residual.clone().requires_grad_()
     loss = point_loss(raw, log_sigma)
-    loss.backward()
+    torch.autograd.backward(loss)
     assert loss >= 0.0
     for gradient in (raw.grad, log_sigma.grad):
         assert gradient is not None and torch.isfinite(gradient[1::2]).all()
@@ -80,7 +81,7 @@ def test_labels_without_points_train_the_rest_as_if_the_heads_had_none(seed: int
     expected, found = yolo_loss(plain, HEADS, batch, STRICT), yolo_loss(pointed, POINTED, batch, STRICT)
     torch.testing.assert_close(found.total, expected.total)
     assert found.points == 0.0
-    found.total.backward()
+    torch.autograd.backward(found.total)
     for head in pointed:
         assert head.grad is not None
         raw = head.grad.reshape(len(head), 2, POINTED[0].values, *head.shape[2:])
@@ -99,7 +100,7 @@ def test_descent_on_the_loss_brings_the_point_to_its_foot(head: Yolo) -> None:
     first = yolo_loss(raws, POINTED, batch, params).points.item()
     for _ in range(150):
         descent.zero_grad()
-        yolo_loss(raws, POINTED, batch, params).total.backward()
+        torch.autograd.backward(yolo_loss(raws, POINTED, batch, params).total)
         descent.step()
     # What is left is the doubt that may be stated at the least.
     assert yolo_loss(raws, POINTED, batch, params).points.item() < 0.1 * first
