@@ -15,7 +15,8 @@ PUBLIC_NAMES = {
         "available_providers", "find_model",
     },
     "standoff.clips": {
-        "COLUMNS", "DETECTIONS_FILE", "RecordedDetections", "is_recording", "metadata_of", "read_detections",
+        "COLUMNS", "DETECTIONS_FILE", "FOOT_COLUMNS", "RecordedDetections", "is_recording", "metadata_of",
+        "read_detections",
     },
     "standoff.stages.motion": {"MotionEstimator", "MotionParams"},
     "standoff.stages.track": {"TrackParams", "Tracker"},

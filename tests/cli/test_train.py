@@ -171,3 +171,13 @@ def test_a_misspelt_section_of_the_file_is_refused(call: Call, plan: Path, tmp_p
 def test_without_data_it_says_so(call: Call, tmp_path: Path) -> None:
     code, _, err = call("train", "--out", tmp_path / "run")
     assert code == 2 and "labelled pictures" in err
+
+
+@pytest.mark.parametrize("in_file", [True, False])
+def test_the_shipped_detector_is_a_start_by_its_name(call: Call, plan: Path, tmp_path: Path, in_file: bool) -> None:
+    if in_file:
+        plan.write_text(plan.read_text() + "weights: site\n")
+    words = () if in_file else ("--weights", "site")
+    code, out, _ = call("train", "--config", plan, "--out", tmp_path / "run", "--show-settings", *words)
+    weights = Path(yaml.safe_load(out)["weights"])
+    assert code == 0 and weights.name == "site.onnx" and weights.is_file()

@@ -182,3 +182,22 @@ def test_what_is_no_table_is_refused(tmp_path: Path) -> None:
     (tmp_path / "detections.parquet").write_bytes(b"PAR1 and no more")
     with pytest.raises(DataError, match="a whole Parquet table"):
         read_detections(tmp_path)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_ground_points_come_back_and_stay_unknown_where_they_are(tmp_path: Path, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    root = rng.normal(0.0, 3.0, (5, 2, 2))
+    foot_px, covariance_px2 = rng.uniform(-50.0, 400.0, (5, 2)), root @ root.transpose(0, 2, 1)
+    unknown = rng.random(5) < 0.5
+    foot_px[unknown], covariance_px2[unknown] = np.nan, np.nan
+    seen = replace(some(5), foot_px=foot_px, foot_covariance_px2=covariance_px2)
+    found = read_detections(write(tmp_path, [None, seen, some(0)])).detections
+    np.testing.assert_allclose(found.foot_px, foot_px)
+    np.testing.assert_allclose(found.foot_covariance_px2, covariance_px2)
+
+
+def test_tables_from_before_ground_points_are_read(tmp_path: Path) -> None:
+    folder = write(tmp_path, [some(3)])
+    change(folder, lambda table: table.select([name for name in table.column_names if not name.startswith("foot")]))
+    assert np.isnan(read_detections(folder).detections.foot_px).all()

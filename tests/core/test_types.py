@@ -188,3 +188,18 @@ def test_a_ground_map_draws_nothing_where_the_lens_sees_nothing() -> None:
     points_px, valid = ground_map(camera=lens).to_image(np.array([[32.0, -24.0], [32.0 + 60.0, -24.0]]))
     assert valid.tolist() == [True, False]
     assert np.isnan(points_px[1]).all()
+
+
+@pytest.mark.parametrize("rows_type", [Detections, Tracks])
+def test_ground_points_may_be_left_out_and_are_unknown_then(rows_type: type[Any]) -> None:
+    given = {name: value for name, value in _ROWS[rows_type].items() if not name.startswith("foot")}
+    rows = rows_type(**given)
+    assert np.isnan(rows.foot_px).all() and rows.foot_px.shape == (2, 2)
+    assert rows.foot_covariance_px2.shape == (2, 2, 2)
+    both = rows_type.joined([rows, rows[np.array([False, True])]])
+    assert len(both) == 3 and np.isnan(both.foot_px).all()
+    covariance = np.stack([np.eye(2), np.full((2, 2), np.nan)])
+    with pytest.raises(ValueError, match="finite where foot_px is"):
+        rows_type(**given, foot_px=np.zeros((2, 2)), foot_covariance_px2=covariance)
+    with pytest.raises(ValueError, match="finite or NaN"):
+        rows_type(**given, foot_px=np.array([[np.inf, 0.0], [0.0, 0.0]]), foot_covariance_px2=covariance)

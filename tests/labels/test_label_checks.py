@@ -123,6 +123,7 @@ def test_whatever_is_marked_what_is_left_lies_inside_and_has_an_area(
             "tree" if ignored else ("worker", "digger")[number]
             for number, ignored in zip(boxes.class_id, boxes.ignored, strict=True)
         ),
+        foot_px=boxes.foot_px,
         xyxy_px=boxes.xyxy_px,
         ignored=boxes.ignored,
     )

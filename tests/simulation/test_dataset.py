@@ -15,7 +15,9 @@ from pycocotools.coco import COCO
 
 from standoff.core.classes import CLASSES
 from standoff.core.errors import ConfigError, OutputError
+from standoff.labels import read_data
 from standoff.labels.types import SPLITS
+from standoff.labels.views import read_views
 from standoff.simulation.dataset import DatasetPlan, record_dataset
 from standoff.simulation.picture_set import is_marked
 
@@ -91,6 +93,20 @@ def test_both_layouts_and_any_number_of_processes_give_the_same_boxes(
             assert first.read_bytes() == second.read_bytes()
             pictures.add(first.stem)
     assert pictures == set(yolo)
+
+
+def test_both_layouts_have_the_same_ground_points_and_every_picture_its_view(sets: SimpleNamespace) -> None:
+    yolo, coco = (
+        {picture.path.stem: picture for pictures in read_data(folder).splits.values() for picture in pictures}
+        for folder in (sets.yolo, sets.coco)
+    )
+    assert len(yolo) == len(coco) == _PLAN.images
+    for stem, picture in yolo.items():
+        np.testing.assert_allclose(picture.foot_px, coco[stem].foot_px, atol=_ROUNDED_PX)
+        assert np.isfinite(picture.foot_px).all(), "of everybody in front of the camera the point is known"
+    views = read_views(sets.yolo / "views.jsonl")
+    assert set(views) == {picture.path.name for picture in yolo.values()}
+    assert all(np.isfinite(views[picture.path.name].to_ground(picture.foot_px)).all() for picture in yolo.values())
 
 
 def test_pycocotools_knows_every_class_and_picture(sets: SimpleNamespace, capsys: pytest.CaptureFixture[str]) -> None:

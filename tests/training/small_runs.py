@@ -63,26 +63,32 @@ QUIET = AugmentParams(mosaic=0.0, cut_out=0.0)
 """No drawn picture is worth a mosaic of four."""
 
 
-def write_data(folder: Path, *, pictures: int = 24, seed: int = 0) -> Path:
+FOOT = ((0.5, 1.0), (0.8, 0.5))
+"""Of people and of vehicles, where in its box a block has its ground point."""
+
+
+def write_data(folder: Path, *, pictures: int = 24, seed: int = 0, points: bool = False) -> Path:
     """Write a YOLO data set of coloured blocks: people upright, vehicles wide; a third of it to validate with."""
     rng = np.random.default_rng(seed)
     for index in range(pictures):
         split = "val" if index % 3 == 0 else "train"
         image = rng.integers(70, 110, (_SIZE_PX[1], _SIZE_PX[0], 3)).astype(np.uint8)
-        lines = []
+        lines, feet = [], []
         for class_id, (width, height) in enumerate(((12, 26), (40, 20))):
             left = int(rng.integers(2, _SIZE_PX[0] // 2 - width)) + class_id * _SIZE_PX[0] // 2
             top = int(rng.integers(2, _SIZE_PX[1] - height - 2))
             image[top : top + height, left : left + width] = _COLOURS_BGR[class_id]
             box = np.array([left + width / 2, top + height / 2, width, height]) / [*_SIZE_PX, *_SIZE_PX]
+            foot = (np.array([left, top]) + np.array(FOOT[class_id]) * [width, height]) / _SIZE_PX
+            feet.append(" ".join(f"{value:.6f}" for value in foot))
             lines.append(f"{class_id} " + " ".join(f"{value:.6f}" for value in box))
-        for kind, suffix in (("images", "png"), ("labels", "txt")):
+        for kind, suffix in (("images", "png"), ("labels", "txt"), *([("points", "txt")] if points else [])):
             (folder / kind / split).mkdir(parents=True, exist_ok=True)
             path = folder / kind / split / f"scene{index}_0.{suffix}"
             if kind == "images":
                 cv2.imwrite(str(path), image)
             else:
-                path.write_text("\n".join(lines) + "\n")
+                path.write_text("\n".join(lines if kind == "labels" else feet) + "\n")
     names = dict(enumerate(CLASSES))
     (folder / "data.yaml").write_text(yaml.safe_dump({"train": "images/train", "val": "images/val", "names": names}))
     return folder

@@ -6,15 +6,21 @@ import numpy as np
 import onnx
 import onnxruntime
 import pytest
+import torch
 from square_detector import SIZE_PX, draw_squares, write_detector
 from training.start.test_blend import write_weights
 
 from standoff.core.errors import ConfigError, ModelError, StandoffError
 from standoff.stages.detect import OnnxDetector
-from standoff.stages.detect.model_card import INPUT_NAME, ModelCard, file_sha256
+from standoff.stages.detect.model_card import INPUT_NAME, OUTPUT_NAME, POINTS_NAME, ModelCard, file_sha256
 from standoff.stages.frames import frame_from_array
 from standoff.training import export_darknet
+from standoff.training.architectures.refitted import pointed_cfg
+from standoff.training.darknet.cfg import read_cfg
+from standoff.training.darknet.network import DarknetNetwork
+from standoff.training.darknet.weights import save_weights
 from standoff.training.join import join_models
+from standoff.training.start.initial_weights import initialize_layers
 
 CLASSES = ("worker", "vehicle")
 
@@ -60,6 +66,28 @@ def test_operators_that_a_part_lists_and_does_not_use_are_no_obstacle(tmp_path: 
     onnx.save(proto, str(models[listing]))
     join_models([(model, {}) for model in models], tmp_path / "joined.onnx")
     np.testing.assert_array_equal(_rows(tmp_path / "joined.onnx", picture), expected)
+
+
+def test_points_stay_with_the_rows_of_the_part_that_gives_them(tmp_path: Path) -> None:
+    plain, other = write_models(tmp_path, 1, 2)
+    pointed = tmp_path / "pointed.cfg"
+    pointed.write_text(pointed_cfg((tmp_path / "small.cfg").read_text()))
+    network = DarknetNetwork(read_cfg(pointed))
+    initialize_layers(network, [index for index, _ in network.convolutions()], torch.Generator().manual_seed(1))
+    save_weights(network, tmp_path / "pointed.weights")
+    export_darknet(pointed, tmp_path / "pointed.weights", tmp_path / "two.names", None, tmp_path / "points.onnx")
+    join_models([(plain, {}), (tmp_path / "points.onnx", {})], tmp_path / "joined.onnx")
+    picture = np.random.default_rng(0).random((1, 3, 64, 96), dtype=np.float32)
+    sessions = (
+        onnxruntime.InferenceSession(str(path), providers=["CPUExecutionProvider"])
+        for path in (tmp_path / "points.onnx", tmp_path / "joined.onnx")
+    )
+    (own,), (joined,) = (session.run([POINTS_NAME], {INPUT_NAME: picture}) for session in sessions)
+    rows = own.shape[1]
+    np.testing.assert_array_equal(joined[:, -rows:], own)
+    assert np.isnan(joined[:, :-rows]).all()
+    join_models([(plain, {}), (other, {})], tmp_path / "without.onnx")
+    assert [output.name for output in onnx.load(str(tmp_path / "without.onnx")).graph.output] == [OUTPUT_NAME]
 
 
 def test_the_card_names_every_part(tmp_path: Path) -> None:

@@ -42,7 +42,7 @@ class _Table:
 
 def print_comparison(comparison: Comparison, *, as_markdown: bool = False) -> None:
     """Print the models side by side, then class by class."""
-    tables = [make(comparison) for make in (_summary, _by_class, _at_best, _by_height, _at_thresholds)]
+    tables = [make(comparison) for make in (_summary, _by_class, _at_best, _by_height, _points, _at_thresholds)]
     for table in tables:
         if not table.rows:
             continue
@@ -161,6 +161,35 @@ def _by_height(comparison: Comparison) -> _Table:
     columns = (*_head(comparison), *_bands())
     caption = "AP50 of boxes so tall in the picture, and how many there are."
     return _Table("By class and height", columns, rows, caption, texts=len(_head(comparison)))
+
+
+def _points(comparison: Comparison) -> _Table:
+    rows = []
+    for result in comparison.results:
+        for one, bands in zip(result.points.classes, result.points.by_height, strict=True):
+            heights = zip(("all", *_bands()), (one, *bands), strict=True)
+            rows += [
+                (
+                    *((_readable(score.name), result.candidate.label)[: len(_head(comparison))]),
+                    height,
+                    f"{score.count}",
+                    *(_number(value, 1) for value in (score.median_px, score.p95_px)),
+                    *(_number(value) for value in (score.median_heights, score.p95_heights)),
+                    *(_number(value, 2) for value in (score.median_m, score.p95_m, score.anchor_median_m)),
+                    _number(100.0 * score.inside, 1),
+                )
+                for height, score in heights
+                if score.count
+            ]
+    columns = (
+        *(*_head(comparison), "box height", "points", "px", "p95 px", "heights", "p95 heights", "m", "p95 m"),
+        *("bottom centre m", "in 95 %, %"),
+    )
+    caption = (
+        "Ground points of right boxes at the best score: median and 95 % of their errors in pixels, in heights of "
+    )
+    caption += "the box, in metres on the ground; how many lie in the ellipse in which 95 of 100 should."
+    return _Table("Where things stand", columns, rows, caption, texts=len(_head(comparison)) + 1)
 
 
 def _at_thresholds(comparison: Comparison) -> _Table:

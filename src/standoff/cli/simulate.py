@@ -132,8 +132,9 @@ def dataset(
     held_out: Annotated[float, typer.Option(min=0, max=0.5, help="Share of scenes for each of val and test.")] = 0.1,
     seed: _Seed = 0,
     excavator_mesh: Annotated[
-        Path | None, typer.Option(help="Folder of COLLADA or glTF parts for a third of the excavators.")
+        Path | None, typer.Option(help="Folder of COLLADA or glTF parts for some of the excavators.")
     ] = None,
+    mesh_share: Annotated[float, typer.Option(min=0, max=1, help="Of the scenes whose excavators these are.")] = 1 / 3,
     processes: _Processes = 2,
     overwrite: _Overwrite = False,
     quiet: _Quiet = False,
@@ -147,7 +148,7 @@ def dataset(
     width_px, height_px = parse_size(size)
     plan = DatasetPlan(
         images=images, per_scene=per_scene, width_px=width_px or 0, height_px=height_px or 0, layout=layout,
-        held_out=held_out, seed=seed, excavator_mesh=excavator_mesh,
+        held_out=held_out, seed=seed, excavator_mesh=excavator_mesh, mesh_share=mesh_share,
     )  # fmt: skip
     with progress("rendering", images, quiet=quiet, unit="pictures") as step:
         record_dataset(plan, out, overwrite=overwrite, processes=processes, on_picture=step)

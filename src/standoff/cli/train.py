@@ -30,7 +30,11 @@ def train(
         ),
     ] = None,
     weights: Annotated[
-        Path | None, typer.Option(help="Darknet weights to start from, whole or cut at a layer. Absent: from scratch.")
+        Path | None,
+        typer.Option(
+            help="Darknet weights to start from, whole or cut at a layer; or an exported detector, such as site, the "
+            "one that comes with standoff. Absent: from scratch."
+        ),
     ] = None,
     config: Annotated[
         Path | None, typer.Option(help="YAML with data, arch, weights and train settings, as a run writes run.yaml.")
@@ -97,6 +101,7 @@ def _read_plan(path: Path) -> dict[str, Any]:
     """Read a plan; paths in it are relative to it, `$VARIABLES` and `~` are expanded."""
     from standoff.config import read_settings_file
     from standoff.labels.documents import resolve_path
+    from standoff.stages.detect import SHIPPED_MODELS
 
     plan = read_settings_file(path)
     unknown = sorted(plan.keys() - set(_PLAN_KEYS))
@@ -106,7 +111,8 @@ def _read_plan(path: Path) -> dict[str, Any]:
         )
     for name in ("data", "weights"):
         if plan.get(name) is not None:
-            plan[name] = resolve_path(str(plan[name]), path.parent)
+            shipped = name == "weights" and plan[name] in SHIPPED_MODELS
+            plan[name] = plan[name] if shipped else resolve_path(str(plan[name]), path.parent)
     if str(plan.get("arch", "")).endswith(".cfg"):
         plan["arch"] = str(resolve_path(plan["arch"], path.parent))
     return plan
@@ -143,6 +149,7 @@ def _section(value: object, name: str) -> dict[str, Any]:
 
 def _make_plan(given: dict[str, Any], origin: str) -> RunPlan:
     from standoff.config import read_params
+    from standoff.stages.detect import find_model
     from standoff.training.run.params import TrainParams
     from standoff.training.run.train import RunPlan
 
@@ -154,6 +161,6 @@ def _make_plan(given: dict[str, Any], origin: str) -> RunPlan:
     return RunPlan(
         data=Path(given["data"]),
         arch=str(given.get("arch") or "yolo-fastest-xl"),
-        weights=None if weights is None else Path(weights),
+        weights=None if weights is None else find_model(str(weights)),
         params=read_params(TrainParams, _section(given.get("train"), "train"), origin, _ADVICE),
     )

@@ -8,6 +8,7 @@
 from standoff.clips.detections import (
     COLUMNS,
     DETECTIONS_FILE,
+    FOOT_COLUMNS,
     RecordedDetections,
     is_recording,
     metadata_of,
@@ -17,6 +18,7 @@ from standoff.clips.detections import (
 __all__ = [
     "COLUMNS",
     "DETECTIONS_FILE",
+    "FOOT_COLUMNS",
     "RecordedDetections",
     "is_recording",
     "metadata_of",

@@ -18,6 +18,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet
 
+from standoff.core.boxes import unknown_points
 from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.errors import DataError
 from standoff.core.homography import BoolArray, FloatArray
@@ -43,13 +44,27 @@ _BOX: Final[tuple[Column, ...]] = (
     ("score", pa.float64(), "", "confidence, 0 to 1"),
     ("class", pa.dictionary(pa.int32(), pa.string()), "", "what it is"),
 )
+FOOT_COLUMNS: Final[tuple[Column, ...]] = (
+    (
+        "foot_x_px",
+        pa.float64(),
+        "px",
+        "ground point: where the middle of the footprint appears; null: the model has none",
+    ),
+    ("foot_y_px", pa.float64(), "px", "the same, down the picture"),
+    ("foot_sigma_x_px", pa.float64(), "px", "standard error of foot_x_px"),
+    ("foot_sigma_y_px", pa.float64(), "px", "standard error of foot_y_px"),
+    ("foot_cov_px2", pa.float64(), "px^2", "covariance of foot_x_px and foot_y_px"),
+)
 COLUMNS: Final[tuple[Column, ...]] = (
     ("stream_id", pa.string(), "", "name of the stream"),
     *_FRAME,
     *_BOX,
     ("class_id", pa.int64(), "", "number of the class in this version of standoff"),
+    *FOOT_COLUMNS,
 )
-"""What is written. Readers ask by name and want `_FRAME` and `_BOX` only; there may be more columns in later files."""
+"""What is written. Readers ask by name and want `_FRAME` and `_BOX` only; there may be more columns in later files, and
+files from before ground points lack those."""
 
 _RECORD_AGAIN: Final = "repeat `standoff run` with detections among its outputs"
 
@@ -233,9 +248,23 @@ def _detections(table: pa.Table, file: Path) -> Detections:
     id_of = np.array([CLASS_BY_NAME[name].id for name in names.tolist()], dtype=np.int64)
     xyxy_px = np.column_stack([columns[name] for name in ("x1_px", "y1_px", "x2_px", "y2_px")])
     try:
-        return Detections(xyxy_px, columns["score"], id_of[index])
+        return Detections(xyxy_px, columns["score"], id_of[index], *_feet(table, file))
     except ValueError as error:
         raise _broken(f"boxes that can be ({error})", file) from None
+
+
+def _feet(table: pa.Table, file: Path) -> tuple[FloatArray, FloatArray]:
+    """Return (N, 2) ground points and (N, 2, 2) covariances; NaN where there is none."""
+    names = [name for name, *_ in FOOT_COLUMNS]
+    if not set(names) <= set(table.column_names):
+        return unknown_points(len(table)), np.full((len(table), 2, 2), np.nan)
+    try:
+        columns = [table.column(name).cast(pa.float64()).fill_null(np.nan).to_numpy() for name in names]
+    except pa.ArrowException:
+        raise _broken("ground points as numbers", file) from None
+    x_px, y_px, sigma_x_px, sigma_y_px, covariance_px2 = columns
+    rows = [sigma_x_px**2, covariance_px2, covariance_px2, sigma_y_px**2]
+    return np.column_stack([x_px, y_px]), np.column_stack(rows).reshape(-1, 2, 2)
 
 
 def _broken(expected: str, file: Path) -> DataError:

@@ -1,10 +1,19 @@
-"""Areas of axis-parallel boxes, and what pairs of them share."""
+"""Areas of axis-parallel boxes, what pairs of them share, and points that belong to them."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from standoff.core.homography import FloatArray
+
+
+def unknown_points(count: int) -> FloatArray:
+    """Return (count, 2) points of which nothing is known: NaN.
+
+    >>> unknown_points(1)
+    array([[nan, nan]])
+    """
+    return np.full((count, 2), np.nan)
 
 
 def areas_px2(xyxy_px: FloatArray) -> FloatArray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, ClassVar, Self
 
@@ -18,11 +18,15 @@ class Rows:
 
     __slots__ = ()
     _COLUMNS: ClassVar[Columns]
+    _OPTIONAL: ClassVar[frozenset[str]] = frozenset()
+    """Columns of numbers after the first that may be left out, empty: then they are NaN in every row."""
 
     def __post_init__(self) -> None:
         count: int | None = None
         for name, (dtype, tail) in self._COLUMNS.items():
             column: npt.NDArray[Any] = np.array(getattr(self, name), dtype=dtype)
+            if column.size == 0 and count and name in self._OPTIONAL:
+                column = np.full((count, *tail), np.nan)
             if column.size == 0:
                 column = column.reshape(0, *tail)
             if column.shape[1:] != tail or column.ndim != 1 + len(tail):
@@ -38,6 +42,11 @@ class Rows:
 
     def __getitem__(self, mask: npt.NDArray[np.bool_] | npt.NDArray[np.int64] | slice) -> Self:
         return replace(self, **{name: getattr(self, name)[mask] for name in self._COLUMNS})  # type: ignore[type-var]
+
+    @classmethod
+    def joined(cls, parts: Sequence[Self]) -> Self:
+        """Return the rows of several structs, one after another."""
+        return cls(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in cls._COLUMNS})
 
     @classmethod
     def empty(cls) -> Self:

@@ -14,9 +14,11 @@ from typing import ClassVar, Literal, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from standoff.core import homography
-from standoff.core.camera import Camera
+from standoff.core.ground_map import GroundMap as GroundMap
+from standoff.core.ground_map import NoGroundMap as NoGroundMap
 from standoff.core.homography import BoolArray, FloatArray
+from standoff.core.motions import CameraMotion as CameraMotion
+from standoff.core.motions import NoCameraMotion as NoCameraMotion
 from standoff.core.rows import Columns, Rows
 from standoff.core.telemetry import Telemetry
 
@@ -106,6 +108,17 @@ class Frame:
         return self.picture.width_px, self.picture.height_px
 
 
+_FOOT_COLUMNS: Columns = {"foot_px": (np.float64, (2,)), "foot_covariance_px2": (np.float64, (2, 2))}
+
+
+def _check_feet(rows: Detections | Tracks) -> None:
+    known = np.isfinite(rows.foot_px).all(axis=1)
+    if not np.isnan(rows.foot_px[~known]).any(axis=1).all():
+        raise ValueError(f"{type(rows).__name__}.foot_px must be finite or NaN")
+    if not np.isfinite(rows.foot_covariance_px2[known]).all():
+        raise ValueError(f"{type(rows).__name__}.foot_covariance_px2 must be finite where foot_px is")
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Detections(Rows):
     """What the detector saw in one frame.
@@ -114,156 +127,34 @@ class Detections(Rows):
         xyxy_px: (N, 4) left, top, right, bottom edges in full-size picture pixels.
         score: (N,) confidence, 0 to 1.
         class_id: (N,) ids of `standoff.core.classes.CLASSES`.
+        foot_px: (N, 2) ground point: where the middle of the footprint appears, perhaps outside the picture; NaN where
+            the model does not tell; left out: nowhere.
+        foot_covariance_px2: (N, 2, 2) of `foot_px`; NaN with it.
     """
 
     xyxy_px: FloatArray
     score: FloatArray
     class_id: IntArray
+    foot_px: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
+    foot_covariance_px2: FloatArray = field(default_factory=lambda: np.zeros((0, 2, 2)))
 
     _COLUMNS: ClassVar[Columns] = {
         "xyxy_px": (np.float64, (4,)),
         "score": (np.float64, ()),
         "class_id": (np.int64, ()),
+        **_FOOT_COLUMNS,
     }
+    _OPTIONAL: ClassVar[frozenset[str]] = frozenset(_FOOT_COLUMNS)
 
     def __post_init__(self) -> None:
         Rows.__post_init__(self)
+        _check_feet(self)
         if not np.isfinite(self.xyxy_px).all() or not np.isfinite(self.score).all():
             raise ValueError("Detections must be finite")
         if (self.xyxy_px[:, :2] > self.xyxy_px[:, 2:]).any():
             raise ValueError("Detections.xyxy_px must be left, top, right, bottom")
         if ((self.score < 0) | (self.score > 1)).any():
             raise ValueError("Detections.score must lie between 0 and 1")
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class NoCameraMotion:
-    """How the picture moved is not known for this frame, and why. Falsy.
-
-    Attributes:
-        reason: A short clause, the same words for the same cause.
-    """
-
-    reason: str
-
-    def __bool__(self) -> bool:
-        return False
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class CameraMotion:
-    """How the picture of the ground moved since a keyframe. Truthy.
-
-    A frame's motion always refers to the keyframe that was in force when it came; where a frame becomes the new
-    keyframe, the motion of the next frame is the first to refer to it. So a keyframe is always a frame before.
-
-    Attributes:
-        keyframe_to_image: (3, 3) signed homography of the ground's points from pixels of the keyframe to pixels of
-            this frame; in both without the lens distortion where `camera` says so.
-        covariance: (9, 9) of its entries, row by row, for the matrix as scaled here.
-        keyframe_s: Presentation timestamp of the keyframe.
-        camera: The lens whose distortion was removed from the points first; None: points as seen in the picture.
-        repeated: True where this frame shows the same picture as the one before.
-    """
-
-    keyframe_to_image: FloatArray
-    covariance: FloatArray
-    keyframe_s: float
-    camera: Camera | None = None
-    repeated: bool = False
-
-    def __post_init__(self) -> None:
-        for name, shape in {"keyframe_to_image": (3, 3), "covariance": (9, 9)}.items():
-            array = np.array(getattr(self, name), dtype=np.float64).reshape(shape)
-            if not np.isfinite(array).all():
-                raise ValueError(f"CameraMotion.{name} must be finite")
-            array.setflags(write=False)
-            object.__setattr__(self, name, array)
-
-    def __bool__(self) -> bool:
-        return True
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class NoGroundMap:
-    """There is no ground map for this frame, and why. Falsy.
-
-    Attributes:
-        reason: A short clause, the same words for the same cause, so that causes can be counted.
-    """
-
-    reason: str
-
-    def __bool__(self) -> bool:
-        return False
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class GroundMap:
-    """Where a pixel stands on the ground, and how sure that is. Truthy.
-
-    Attributes:
-        image_to_ground: (3, 3) signed homography from *undistorted* pixels to metres in the site frame
-            (x east, y north; or x along the reference's first edge, y to its left seen from above);
-            its denominator is positive in front of the camera.
-        covariance: (10, 10) of its entries, row by row, for the matrix as scaled here, and of the lens's k1; (9, 9) of
-            the entries alone where the lens is taken as it is.
-        image_size_px: (width, height) of the pictures that it is for.
-        valid_px: (V, 2) polygon in undistorted pixels outside which it is not trusted; V = 0: no limit
-            but the horizon.
-        method: How it was found ("surveyed", "reference:paper", ...).
-        scale_m_per_px: Eq. 6's scale, reference_m / reference_px on the paper's rectified plane.
-        anchors_px: (A, 2) the points, as seen in the picture, that fixed it, for drawing.
-        camera: The lens whose distortion is removed from points first; None: points are used as they are.
-        age_s: Seconds since it was last observed; 0 when observed in this frame.
-        site_frame: Counts the stream's site frames up: where something better begins to tell the ground, places may be
-            counted from elsewhere, and those of different frames cannot be compared.
-    """
-
-    image_to_ground: FloatArray
-    covariance: FloatArray
-    image_size_px: tuple[int, int]
-    method: str
-    scale_m_per_px: float
-    valid_px: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
-    anchors_px: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
-    camera: Camera | None = None
-    age_s: float = 0.0
-    site_frame: int = 0
-
-    def __post_init__(self) -> None:
-        covariance = np.zeros((10, 10))
-        given = np.asarray(self.covariance, dtype=np.float64)
-        if given.shape not in {(9, 9), (10, 10)}:
-            raise ValueError(f"GroundMap.covariance must be (9, 9) or (10, 10), not {given.shape}")
-        covariance[: len(given), : len(given)] = given
-        object.__setattr__(self, "covariance", covariance)
-        shapes = {"image_to_ground": (3, 3), "covariance": (10, 10), "valid_px": (-1, 2), "anchors_px": (-1, 2)}
-        for name, shape in shapes.items():
-            array = np.array(getattr(self, name), dtype=np.float64).reshape(shape)
-            if not np.isfinite(array).all():
-                raise ValueError(f"GroundMap.{name} must be finite")
-            array.setflags(write=False)
-            object.__setattr__(self, name, array)
-
-    def __bool__(self) -> bool:
-        return True
-
-    def undistorted(self, points_px: FloatArray) -> FloatArray:
-        """Return (N, 2) picture points without the lens distortion; NaN where the lens has no inverse."""
-        points_px = np.asarray(points_px, dtype=np.float64).reshape(-1, 2)
-        return points_px if self.camera is None else self.camera.undistort(points_px)
-
-    def to_ground(self, points_px: FloatArray) -> tuple[FloatArray, BoolArray]:
-        """Map (N, 2) picture points to (N, 2) metres; NaN and False beyond the horizon."""
-        return homography.apply(self.image_to_ground, self.undistorted(points_px))
-
-    def to_image(self, points_m: FloatArray) -> tuple[FloatArray, BoolArray]:
-        """Map (N, 2) metres to (N, 2) distorted picture points; NaN behind the camera and where no lens sees."""
-        points_px, valid = homography.apply(homography.invert(self.image_to_ground), points_m)
-        if self.camera is not None:
-            points_px = self.camera.distort(points_px)
-        return points_px, valid & np.isfinite(points_px).all(axis=1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -277,6 +168,8 @@ class Tracks(Rows):
         class_id: (M,) ids of `CLASSES`.
         observed: (M,) False where the track coasts: no detection supports it in this frame.
         age_s: (M,) seconds since the track was first seen.
+        foot_px: (M, 2) ground point, as in `Detections`, smoothed inside the box; predicted where not observed.
+        foot_covariance_px2: (M, 2, 2) of `foot_px`; NaN with it.
     """
 
     track_id: IntArray
@@ -285,6 +178,8 @@ class Tracks(Rows):
     class_id: IntArray
     observed: BoolArray
     age_s: FloatArray
+    foot_px: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
+    foot_covariance_px2: FloatArray = field(default_factory=lambda: np.zeros((0, 2, 2)))
 
     _COLUMNS: ClassVar[Columns] = {
         "track_id": (np.int64, ()),
@@ -293,7 +188,13 @@ class Tracks(Rows):
         "class_id": (np.int64, ()),
         "observed": (np.bool_, ()),
         "age_s": (np.float64, ()),
+        **_FOOT_COLUMNS,
     }
+    _OPTIONAL: ClassVar[frozenset[str]] = frozenset(_FOOT_COLUMNS)
+
+    def __post_init__(self) -> None:
+        Rows.__post_init__(self)
+        _check_feet(self)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

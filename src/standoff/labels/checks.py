@@ -31,12 +31,14 @@ class CheckedBoxes:
         xyxy_px: (N, 4) inside the picture.
         class_id: (N,).
         ignored: (N,).
+        foot_px: (N, 2) ground points; inside the picture or not, NaN where none is marked.
         problems: What was dropped or mended.
     """
 
     xyxy_px: FloatArray
     class_id: IntArray
     ignored: BoolArray
+    foot_px: FloatArray
     problems: tuple[Problem, ...]
 
 
@@ -69,7 +71,7 @@ def check_boxes(picture: SourcePicture, class_ids: Mapping[str, int | None]) -> 
     )
     problems = tuple(_mended(picture, int(where.sum()), kind) for where, kind in faults if where.any())
     good = first & visible
-    return CheckedBoxes(cut_px[good], class_id[good], ignored[good], problems)
+    return CheckedBoxes(cut_px[good], class_id[good], ignored[good], picture.foot_px[kept][good], problems)
 
 
 def inside(xyxy_px: FloatArray, size_px: tuple[int, int]) -> FloatArray:

@@ -1,7 +1,7 @@
 """COCO annotation files: pictures, categories and boxes in one JSON file.
 
 A box is left, top, width, height in pixels, counted from the left and upper *edge* of the first pixel; ours are 0 at
-its centre. Crowds (`iscrowd`) become ignored regions.
+its centre. Crowds (`iscrowd`) become ignored regions. The keypoint `ground_point` becomes the ground point.
 """
 
 from __future__ import annotations
@@ -14,8 +14,11 @@ from typing import Any
 
 import numpy as np
 
+from standoff.core.boxes import unknown_points
 from standoff.core.errors import DataError
+from standoff.core.homography import FloatArray
 from standoff.labels.documents import read_json
+from standoff.labels.ground_points import KEYPOINT
 from standoff.labels.pictures import first_file, read_size_px
 from standoff.labels.source import BadPicture, SourcePicture, SourceSet, read_each, split_named
 from standoff.labels.types import Problem, Split
@@ -32,6 +35,7 @@ class _CocoFile:
         path: Of the file.
         folders: Where its pictures may be.
         labels: By category id, in the order of the ids.
+        point_at: By category id, of those that have it: where the ground point is among the keypoints.
         images: As listed.
         boxes: Annotations by image id.
         lost: Annotations of images that are not listed.
@@ -42,6 +46,7 @@ class _CocoFile:
     path: Path
     folders: tuple[Path, ...]
     labels: Mapping[_Id, str]
+    point_at: Mapping[_Id, int]
     images: Sequence[_Entry]
     boxes: Mapping[_Id, Sequence[_Entry]]
     lost: Sequence[_Entry]
@@ -78,7 +83,15 @@ def _open(path: Path, content: dict[str, Any], pictures: Path | None) -> _CocoFi
         boxes.get(_id(entry, "image_id"), lost).append(entry)
     shared = frozenset(number for number, count in Counter(_id(entry, "id") for entry in images).items() if count > 1)
     labels = {_id(entry, "id"): str(entry["name"]) for entry in named}
-    return _CocoFile(path, _folders(path, pictures), labels, images, boxes, lost, shared, split_named(path.stem))
+    keypoints = {_id(entry, "id"): entry.get("keypoints") for entry in named}
+    point_at = {
+        number: names.index(KEYPOINT)
+        for number, names in keypoints.items()
+        if isinstance(names, list) and KEYPOINT in names
+    }
+    return _CocoFile(
+        path, _folders(path, pictures), labels, point_at, images, boxes, lost, shared, split_named(path.stem)
+    )
 
 
 def _id(entry: _Entry, key: str) -> _Id:
@@ -149,4 +162,21 @@ def _read_picture(listed: tuple[_CocoFile, _Entry]) -> SourcePicture:
         np.array([bool(box.get("iscrowd")) for box in boxes], np.bool_),
         file.split,
         str(image.get("scene", "")),
+        _points(boxes, categories, file.point_at, path),
     )
+
+
+def _points(boxes: Sequence[_Entry], categories: Sequence[_Id], point_at: Mapping[_Id, int], path: Path) -> FloatArray:
+    """Return (N, 2) ground points; NaN where none is marked."""
+    points = unknown_points(len(boxes))
+    for row, (box, category) in enumerate(zip(boxes, categories, strict=True)):
+        if category not in point_at or "keypoints" not in box:
+            continue
+        start = 3 * point_at[category]
+        try:
+            x, y, visibility = (float(number) for number in box["keypoints"][start : start + 3])
+        except (TypeError, ValueError) as error:
+            raise BadPicture(path, "an annotation whose keypoints are not numbers", "unreadable labels") from error
+        if visibility and np.isfinite([x, y]).all():
+            points[row] = x - 0.5, y - 0.5
+    return points

@@ -10,10 +10,11 @@ class CocoDocument:
     """Collect pictures and boxes; COCO counts all its ids from 1.
 
     Args:
-        categories: Fields of each class (`name`, and `supercategory` if there is one), in the order of class ids.
+        categories: Fields of each class (`name`; `supercategory` and `keypoints`, if there are any), in the order
+            of class ids.
     """
 
-    def __init__(self, categories: Sequence[Mapping[str, str]]) -> None:
+    def __init__(self, categories: Sequence[Mapping[str, Any]]) -> None:
         self._categories = [{"id": number, **category} for number, category in enumerate(categories, start=1)]
         self._images: list[dict[str, Any]] = []
         self._annotations: list[dict[str, Any]] = []

@@ -10,6 +10,7 @@ from typing import Final
 
 import numpy as np
 
+from standoff.core.boxes import unknown_points
 from standoff.core.errors import DataError
 from standoff.core.homography import FloatArray
 from standoff.labels.checks import check_boxes, inside
@@ -176,6 +177,7 @@ def _label(
         place.group,
         place.source.name,
         place.source.weight,
+        np.concatenate([boxes.foot_px, unknown_points(len(regions_px))]),
     )
     return labelled, boxes.problems
 

@@ -39,6 +39,7 @@ def to_site_classes(data: LabelledData) -> LabelledData:
             xyxy_px=picture.xyxy_px[kept],
             class_id=np.maximum(class_id[kept], 0),
             ignored=picture.ignored[kept],
+            foot_px=picture.foot_px[kept],
         )
 
     splits = {split: tuple(map(renamed, pictures)) for split, pictures in data.splits.items()}

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final, TypeVar
 
 from standoff.core.homography import BoolArray, FloatArray
+from standoff.labels.ground_points import NO_POINTS, one_point_a_box
 from standoff.labels.types import Problem, Split
 
 _Item = TypeVar("_Item")
@@ -50,6 +51,7 @@ class SourcePicture:
         ignored: (N,) True where the set says that nothing is known.
         split: Where the set puts it; None: it does not say.
         scene: What the set calls its scene; empty: it does not say.
+        foot_px: (N, 2) where the middle of each footprint appears, as in `LabelledPicture`; left out: nowhere marked.
     """
 
     path: Path
@@ -59,6 +61,10 @@ class SourcePicture:
     ignored: BoolArray
     split: Split | None = None
     scene: str = ""
+    foot_px: FloatArray = field(default_factory=lambda: NO_POINTS)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "foot_px", one_point_a_box(self.foot_px, self.xyxy_px))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, get_args
 
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import IntArray
+from standoff.labels.ground_points import NO_POINTS, one_point_a_box
 
 Split = Literal["train", "val", "test"]
 SPLITS: tuple[Split, ...] = get_args(Split)
@@ -31,6 +32,8 @@ class LabelledPicture:
         group: Scene, flight or video that it belongs to; no group is in two splits.
         source: Name of the data set.
         weight: How often it is drawn in training, relative to others.
+        foot_px: (N, 2) ground points: where the middle of each footprint appears (of an excavator the centre of its
+            swing), also where it is hidden or outside the picture; NaN where nobody marked it; left out: nowhere.
     """
 
     path: Path
@@ -41,6 +44,10 @@ class LabelledPicture:
     group: str
     source: str
     weight: float = 1.0
+    foot_px: FloatArray = field(default_factory=lambda: NO_POINTS)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "foot_px", one_point_a_box(self.foot_px, self.xyxy_px))
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,7 @@
 """YOLO folders: pictures, and beside each a text file of lines `class centre-x centre-y width height`.
 
 The four numbers are shares of the picture, counted from the left and upper *edge* of the first pixel; ours are 0 at
-its centre, half a pixel further.
+its centre, half a pixel further. Ground points may lie beside them (see `standoff.labels.ground_points`).
 """
 
 from __future__ import annotations
@@ -17,11 +17,14 @@ from standoff.core.classes import names_by_line
 from standoff.core.errors import DataError
 from standoff.core.homography import FloatArray
 from standoff.labels.documents import read_yaml
+from standoff.labels.ground_points import POINTS_FOLDER, in_pixels, read_points
 from standoff.labels.pictures import find_pictures, first_file, read_size_px
 from standoff.labels.source import BadPicture, SourcePicture, SourceSet, read_each, split_named
 from standoff.labels.types import SPLITS, Split
 
 _NAME_FILES: Final = ("classes.txt", "obj.names", "labels/classes.txt")
+_BOX, _BOX_AND_POINT = 5, 8
+"""Values of a line: class and box; then a keypoint and its visibility."""
 _Listed = tuple[Path, Split | None]
 
 
@@ -147,61 +150,77 @@ def _read_listed(listed: Sequence[_Listed], labels: tuple[str, ...]) -> SourceSe
 def _read_picture(labels: tuple[str, ...], listed: _Listed) -> SourcePicture:
     path, split = listed
     size_px = read_size_px(path)
-    numbers, xyxy_px = read_boxes(path, size_px)
+    numbers, xyxy_px, foot_px = read_boxes(path, size_px)
     unknown = [number for number in numbers if number not in range(len(labels))]
     if unknown:
         raise BadPicture(path, f"class id {unknown[0]:g}, of {len(labels)} classes", "unknown class id")
     names = tuple(labels[int(number)] for number in numbers)
-    return SourcePicture(path, size_px, names, xyxy_px, np.zeros(len(names), np.bool_), split)
+    return SourcePicture(path, size_px, names, xyxy_px, np.zeros(len(names), np.bool_), split, foot_px=foot_px)
 
 
-def read_boxes(picture: Path, size_px: tuple[int, int]) -> tuple[FloatArray, FloatArray]:
-    """Read the label file of a picture.
+def read_boxes(picture: Path, size_px: tuple[int, int]) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Read the label file of a picture, and the ground points beside it.
 
     Args:
         picture: Its labels lie beside it, or in `labels` where it is in `images`.
         size_px: (width, height) of the picture.
 
     Returns:
-        (N,) class ids as written, and (N, 4) boxes; 0 is the centre of the first pixel.
+        (N,) class ids as written, (N, 4) boxes and (N, 2) ground points, NaN where none is marked; 0 is the centre of
+        the first pixel.
 
     Raises:
-        BadPicture: There is no label file, or it holds something else.
+        BadPicture: There is no label file, or one of the files holds something else.
     """
     rows = _read_rows(_label_file(picture))
-    return rows[:, 0], _to_corners(rows[:, 1:], size_px)
+    points = _sibling(picture, POINTS_FOLDER)
+    if points is None or not points.is_file():
+        foot_px = in_pixels(rows[:, 5:7], size_px)
+    else:
+        try:
+            foot_px = read_points(points, len(rows), size_px)
+        except ValueError as error:
+            raise BadPicture(points, str(error), "unreadable labels") from error
+    return rows[:, 0], _to_corners(rows[:, 1:5], size_px), foot_px
 
 
 def _label_file(picture: Path) -> Path:
     """Return the label file: in `labels` where the picture is in `images`, else beside it."""
-    parts = list(picture.parts)
-    candidates = [picture.with_suffix(".txt")]
-    if "images" in parts[:-1]:
-        last = len(parts) - 2 - parts[-2::-1].index("images")
-        candidates.insert(0, Path(*parts[:last], "labels", *parts[last + 1 :]).with_suffix(".txt"))
-    file = first_file(candidates)
+    apart = _sibling(picture, "labels")
+    file = first_file([*([apart] if apart else []), picture.with_suffix(".txt")])
     if not file.is_file():
         raise BadPicture(picture, f"no label file at {file}", "label file missing")
     return file
 
 
+def _sibling(picture: Path, folder: str) -> Path | None:
+    """Return the text file of a picture in another folder beside `images`; None where it is in no such folder."""
+    parts = list(picture.parts)
+    if "images" not in parts[:-1]:
+        return None
+    last = len(parts) - 2 - parts[-2::-1].index("images")
+    return Path(*parts[:last], folder, *parts[last + 1 :]).with_suffix(".txt")
+
+
 def _read_rows(path: Path) -> FloatArray:
-    """Return (N, 5) numbers of a label file; an empty file has none."""
+    """Return (N, 7) numbers of a label file, the last two NaN where no point is marked; an empty file has none."""
     try:
         lines = [line.split() for line in path.read_text(encoding="utf-8-sig").splitlines()]
     except (OSError, UnicodeDecodeError) as error:
         raise BadPicture(path, f"no text ({error})", "unreadable labels") from error
     rows = [row for row in lines if row]
-    if any(len(row) != 5 for row in rows):
-        count = next(len(row) for row in rows if len(row) != 5)
-        raise BadPicture(path, f"a line of {count} values instead of 5", "unreadable labels")
+    wrong = [len(row) for row in rows if len(row) not in (_BOX, _BOX_AND_POINT)]
+    if wrong:
+        raise BadPicture(path, f"a line of {wrong[0]} values instead of 5", "unreadable labels")
+    padded = [row if len(row) == _BOX_AND_POINT else [*row, "0", "0", "0"] for row in rows]
     try:
-        numbers = np.array(rows, dtype=np.float64).reshape(-1, 5)
+        numbers = np.array(padded, dtype=np.float64).reshape(-1, _BOX_AND_POINT)
     except ValueError as error:
         raise BadPicture(path, f"not a number ({error})", "unreadable labels") from error
     if not np.isfinite(numbers).all():
         raise BadPicture(path, "a number that is not finite", "unreadable labels")
-    return numbers
+    numbers[numbers[:, 7] == 0.0, 5:7] = np.nan
+    return numbers[:, :7]
 
 
 def _to_corners(shares: FloatArray, size_px: tuple[int, int]) -> FloatArray:

@@ -12,6 +12,7 @@ from typing import Literal, get_args
 import cv2
 import numpy as np
 
+from standoff.core.pose import View
 from standoff.labels.types import Split
 from standoff.simulation.covers import COVER_KINDS
 from standoff.simulation.crew import work_through
@@ -45,7 +46,8 @@ class DatasetPlan:
         layout: Of the annotations.
         held_out: Share of scenes for each of val and test.
         seed: Of everything random.
-        excavator_mesh: Folder of mesh parts for a third of the excavators, or None.
+        excavator_mesh: Folder of mesh parts for some of the excavators, or None.
+        mesh_share: Of the scenes whose excavators are made of them.
 
     Raises:
         ConfigError: A size or seed out of range.
@@ -59,6 +61,7 @@ class DatasetPlan:
     held_out: float
     seed: int
     excavator_mesh: Path | None = None
+    mesh_share: float = 1 / 3
 
     def __post_init__(self) -> None:
         check_seed(self.seed)
@@ -123,9 +126,10 @@ def open_scene_shooter(plan: DatasetPlan) -> Generator[Callable[[int], list[Pict
             studio = Studio(site)
         pictures = []
         for index in range(min(plan.per_scene, plan.images - scene * plan.per_scene)):
-            jpeg, entities = _shoot(studio, site, obstacles, rng, index)
+            jpeg, entities, view = _shoot(studio, site, obstacles, rng, index)
             name = f"{plan.seed}-{scene:05d}-{index:02d}.jpg"
-            pictures.append(Picture(name, jpeg, (plan.width_px, plan.height_px), entities, about={"scene": scene}))
+            size_px = plan.width_px, plan.height_px
+            pictures.append(Picture(name, jpeg, size_px, entities, about={"scene": scene}, view=view))
         return pictures
 
     try:
@@ -155,7 +159,7 @@ def _draw_plan(rng: np.random.Generator, plan: DatasetPlan) -> Plan:
         furnished_m=40.0,
         reference_offset_m=(float(rng.normal(0.0, 6.0)), float(rng.normal(0.0, 6.0))),
     )
-    mesh = plan.excavator_mesh if rng.random() < 1 / 3 else None
+    mesh = plan.excavator_mesh if rng.random() < plan.mesh_share else None
     return Plan("dataset", preset, int(rng.integers(MAX_SEED)), excavator_mesh=mesh)
 
 
@@ -169,8 +173,8 @@ def _thin_street(rng: np.random.Generator, scene: Scene) -> Scene:
 
 def _shoot(
     studio: Studio, site: Site, obstacles: Obstacles, rng: np.random.Generator, index: int
-) -> tuple[bytes, list[Row]]:
-    """Return one picture as JPEG, and who is marked in it."""
+) -> tuple[bytes, list[Row], View]:
+    """Return one picture as JPEG, who is marked in it, and where it was taken from."""
     time_s = float(rng.uniform(0.0, site.duration_s))
     size_px = (site.camera.width_px, site.camera.height_px)
     view = draw_view(rng, size_px, scene_at(site.scene, time_s).bodies, obstacles)
@@ -181,7 +185,7 @@ def _shoot(
     quality = int(rng.choice([50, 65, 75, 85, 92, 95]))
     coded, jpeg = cv2.imencode(".jpg", shot.image, [cv2.IMWRITE_JPEG_QUALITY, quality])
     assert coded
-    return jpeg.tobytes(), [row for row in shot.entities if is_marked(row)]
+    return jpeg.tobytes(), [row for row in shot.entities if is_marked(row)], view
 
 
 def _vary(rng: np.random.Generator, look: Look) -> Look:

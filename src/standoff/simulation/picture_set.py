@@ -13,12 +13,19 @@ import yaml
 
 from standoff import __version__
 from standoff.core.classes import CLASSES
+from standoff.core.homography import FloatArray
+from standoff.core.pose import View
+from standoff.labels.ground_points import POINTS_FOLDER, points_line
 from standoff.labels.marking import would_be_marked
 from standoff.labels.types import SPLITS, Split
+from standoff.labels.views import VIEWS_FILE, GroundView, view_line
 from standoff.simulation.coco import Annotations
 from standoff.simulation.truth import Row
 
-SET_FILES: Final = ("images", "labels", "annotations", "ignore.yaml", "data.yaml", "dataset.json")
+SET_FILES: Final = (
+    *("images", "labels", POINTS_FOLDER, "annotations"),
+    *("ignore.yaml", VIEWS_FILE, "data.yaml", "dataset.json"),
+)
 """What a data set holds at its top."""
 
 Box = tuple[float, float, float, float]
@@ -36,6 +43,7 @@ class Picture:
             visible.
         ignored_px: Left, top, right, bottom of places of which nothing is known.
         about: Further fields of the picture in COCO's layout.
+        view: Where it was taken from; None: nobody knows.
     """
 
     name: str
@@ -44,6 +52,7 @@ class Picture:
     entities: Sequence[Row]
     ignored_px: Sequence[Box] = ()
     about: Mapping[str, Any] = field(default_factory=dict)
+    view: View | None = None
 
 
 def draw_split(key: Sequence[int], index: int, count: int, held_out: float) -> Split:
@@ -75,22 +84,31 @@ class PictureSet:
         self._folder, self._layout = folder, layout
         self._annotations = {split: Annotations() for split in SPLITS}
         self._ignored: dict[str, list[list[float]]] = {}
+        self._views: list[str] = []
         for split in SPLITS:
             (folder / "images" / split).mkdir(parents=True)
             if layout == "yolo":
                 (folder / "labels" / split).mkdir(parents=True)
+                (folder / POINTS_FOLDER / split).mkdir(parents=True)
 
     def add(self, split: Split, picture: Picture) -> None:
         """Write a picture and, in YOLO's layout, its labels."""
         (self._folder / "images" / split / picture.name).write_bytes(picture.jpeg)
         if self._layout == "yolo":
-            label = self._folder / "labels" / split / Path(picture.name).with_suffix(".txt")
-            label.write_text("".join(yolo_line(row, picture.size_px) for row in picture.entities))
+            name = Path(picture.name).with_suffix(".txt")
+            lines = [yolo_line(row, picture.size_px) for row in picture.entities]
+            (self._folder / "labels" / split / name).write_text("".join(lines))
+            points = [points_line(foot_of(row), picture.size_px) for row in picture.entities]
+            (self._folder / POINTS_FOLDER / split / name).write_text("".join(points))
         else:
             entry = {"file_name": f"images/{split}/{picture.name}", **picture.about}
             self._annotations[split].add(entry, picture.entities, picture.size_px, None)
         if picture.ignored_px:
             self._ignored[Path(picture.name).stem] = [[round(edge, 2) for edge in box] for box in picture.ignored_px]
+        if picture.view is not None:
+            heights_m = [row["z_m"] for row in picture.entities if "z_m" in row]
+            ground_m = float(np.mean(heights_m)) if heights_m else 0.0
+            self._views.append(view_line(picture.name, GroundView(picture.view, ground_m)))
 
     def finish(self, description: str, settings: Mapping[str, Any]) -> None:
         """Write what belongs to all pictures.
@@ -106,6 +124,8 @@ class PictureSet:
                 (self._folder / "annotations" / f"{split}.json").write_text(text)
         if self._ignored:
             (self._folder / "ignore.yaml").write_text(yaml.safe_dump(self._ignored, default_flow_style=None))
+        if self._views:
+            (self._folder / VIEWS_FILE).write_text("".join(self._views))
         names = {site_class.id: site_class.name for site_class in CLASSES}
         content: dict[str, Any] = {**{split: f"images/{split}" for split in SPLITS}, "names": names}
         (self._folder / "data.yaml").write_text(yaml.safe_dump(content, sort_keys=False))
@@ -129,6 +149,11 @@ def yolo_line(row: Row, size_px: tuple[int, int]) -> str:
         (bottom - top) / height_px,
     )
     return f"{row['class_id']} " + " ".join(f"{share:.6f}" for share in shares) + "\n"
+
+
+def foot_of(row: Row) -> FloatArray:
+    """Return (2,) where the middle of an entity's footprint appears; NaN where the row does not say."""
+    return np.array([row.get("foot_x_px", np.nan), row.get("foot_y_px", np.nan)], dtype=np.float64)
 
 
 def is_marked(row: Row) -> bool:

@@ -17,10 +17,12 @@ from standoff.simulation.scene import Batch
 
 _TRIES = 12
 _LOWEST_M, _HIGHEST_M = 15.0, 60.0
+_LANDING_SHARE, _LANDING_M = 0.15, (4.0, 15.0)
+"""Of views from a drone that comes down, and how high it then is."""
 _PITCHES_DEG = ((20.0, 40.0), (40.0, 70.0), (70.0, 90.0))
 _PITCH_SHARES = (0.4, 0.42, 0.18)
 _PERSON_M = 1.75
-_PERSON_SHARE = (0.008, 0.11)
+_PERSON_SHARE, _LANDING_PERSON_SHARE = (0.008, 0.11), (0.06, 0.32)
 """Smallest and largest a person in the middle may be before foreshortening, as a share of the picture's width."""
 _WANTED = 3
 _BARE_SHARE = 0.1
@@ -95,7 +97,7 @@ class Obstacles:
 
 
 def draw_view(rng: np.random.Generator, size_px: tuple[int, int], bodies: Sequence[Body], obstacles: Obstacles) -> View:
-    """Draw a view from 15 to 60 m that shows some of the bodies, with nothing right before the lens.
+    """Draw a view from 15 to 60 m, now and then from 4 m on, that shows some of the bodies, nothing right before it.
 
     Args:
         rng: Decides.
@@ -104,11 +106,16 @@ def draw_view(rng: np.random.Generator, size_px: tuple[int, int], bodies: Sequen
         obstacles: Of the site.
     """
     wanted = 0 if rng.random() < _BARE_SHARE else min(_WANTED, len(bodies))
+    lands = rng.random() < _LANDING_SHARE
     best, best_worth = None, (False, False, -1)
     for _ in range(_TRIES):
         target_m = _draw_target(rng, bodies)
-        view = _aim(rng, size_px, target_m)
-        worth = (_is_clear(view, obstacles), _shows_people_well(view, target_m), min(_count(view, bodies), wanted))
+        view = _aim(rng, size_px, target_m, lands=lands)
+        worth = (
+            _is_clear(view, obstacles),
+            _shows_people_well(view, target_m, lands=lands),
+            min(_count(view, bodies), wanted),
+        )
         if best is None or worth > best_worth:
             best, best_worth = view, worth
         if worth == (True, True, wanted):
@@ -139,13 +146,14 @@ def _draw_target(rng: np.random.Generator, bodies: Sequence[Body]) -> FloatArray
     return middle + spread_m
 
 
-def _aim(rng: np.random.Generator, size_px: tuple[int, int], target_m: FloatArray) -> View:
+def _aim(rng: np.random.Generator, size_px: tuple[int, int], target_m: FloatArray, *, lands: bool) -> View:
     camera = drone_camera(*size_px, float(rng.uniform(36.0, 84.0)), rng)
     low_deg, high_deg = _PITCHES_DEG[int(rng.choice(len(_PITCHES_DEG), p=_PITCH_SHARES))]
+    lowest_m, highest_m = _LANDING_M if lands else (_LOWEST_M, _HIGHEST_M)
     still = Still.over(
         camera,
         target_m[:2],
-        altitude_m=float(_LOWEST_M * (_HIGHEST_M / _LOWEST_M) ** rng.beta(1.0, 1.8)),
+        altitude_m=float(lowest_m * (highest_m / lowest_m) ** rng.beta(1.0, 1.8)),
         pitch_deg=float(rng.uniform(low_deg, high_deg)),
         heading_deg=float(rng.uniform(0.0, 360.0)),
         roll_deg=float(rng.normal(0.0, 1.0)),
@@ -153,10 +161,11 @@ def _aim(rng: np.random.Generator, size_px: tuple[int, int], target_m: FloatArra
     return still.fixed
 
 
-def _shows_people_well(view: View, target_m: FloatArray) -> bool:
+def _shows_people_well(view: View, target_m: FloatArray, *, lands: bool) -> bool:
     focal_px = float(view.camera.matrix[0, 0])
     share = focal_px * _PERSON_M / float(np.linalg.norm(view.position_m - target_m)) / view.camera.width_px
-    return _PERSON_SHARE[0] <= share <= _PERSON_SHARE[1]
+    least, most = _LANDING_PERSON_SHARE if lands else _PERSON_SHARE
+    return least <= share <= most
 
 
 def _count(view: View, bodies: Sequence[Body]) -> int:

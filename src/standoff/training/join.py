@@ -2,8 +2,9 @@
 
 A network that learnt machines from rendered sites and one that still knows real people make one detector that knows
 both. Each sees the same input; their boxes are put one after another, and the suppression of overlapping boxes of one
-class, which follows every detector, merges what both have found. Scores of two networks mean different things: a factor
-for the one that is wrong more often lets the other be heard first. The time a picture takes is the sum of theirs.
+class, which follows every detector, merges what both have found. Where one gives no ground points, its boxes have none.
+Scores of two networks mean different things: a factor for the one that is wrong more often lets the other be heard
+first. The time a picture takes is the sum of theirs.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import numpy.typing as npt
 import onnx
 
 from standoff.core.errors import ConfigError, ModelError
-from standoff.stages.detect.model_card import INPUT_NAME, OUTPUT_NAME, ModelCard, file_sha256
+from standoff.stages.detect.model_card import INPUT_NAME, OUTPUT_NAME, POINTS_NAME, ModelCard, file_sha256
 from standoff.stages.sinks.whole import whole_file
 from standoff.training.quantization.onnx_file import read_own_model
 
@@ -145,8 +146,28 @@ def _joined(models: Sequence[onnx.ModelProto], factors: Sequence[_Floats]) -> on
         outputs.append(boxes)
     nodes.append(onnx.helper.make_node("Concat", outputs, [OUTPUT_NAME], axis=1))
     first = models[0].graph
-    rows = sum(model.graph.output[0].type.tensor_type.shape.dim[1].dim_value for model in models)
-    width = first.output[0].type.tensor_type.shape.dim[2].dim_value
-    result = onnx.helper.make_tensor_value_info(OUTPUT_NAME, onnx.TensorProto.FLOAT, [1, rows, width])
-    graph = onnx.helper.make_graph(nodes, "joined", list(first.input), [result], tensors)
+    rows = [_output(model, OUTPUT_NAME)[1] for model in models]
+    results = [_result(OUTPUT_NAME, sum(rows), _output(models[0], OUTPUT_NAME)[2])]
+    widths = [_output(model, POINTS_NAME)[2:] for model in models]
+    if any(widths):
+        points = [f"part{index}_{POINTS_NAME}" for index in range(len(models))]
+        missing = [index for index, width in enumerate(widths) if not width]
+        point_columns = max(widths)[0]
+        tensors += [
+            onnx.numpy_helper.from_array(np.full((1, rows[index], point_columns), np.nan, np.float32), points[index])
+            for index in missing
+        ]
+        nodes.append(onnx.helper.make_node("Concat", points, [POINTS_NAME], axis=1))
+        results.append(_result(POINTS_NAME, sum(rows), point_columns))
+    graph = onnx.helper.make_graph(nodes, "joined", list(first.input), results, tensors)
     return onnx.helper.make_model(graph, opset_imports=_used_opsets(models[0]), ir_version=models[0].ir_version)
+
+
+def _output(model: onnx.ModelProto, name: str) -> tuple[int, ...]:
+    """Return the shape of an output; () where there is none of the name."""
+    found = (output for output in model.graph.output if output.name == name)
+    return next((tuple(dim.dim_value for dim in output.type.tensor_type.shape.dim) for output in found), ())
+
+
+def _result(name: str, rows: int, columns: int) -> onnx.ValueInfoProto:
+    return onnx.helper.make_tensor_value_info(name, onnx.TensorProto.FLOAT, [1, rows, columns])

@@ -9,6 +9,7 @@ from evaluation.detection.drawn_detections import CLASSES, random_scenes
 from standoff.evaluation.detection.accuracy_time import draw_accuracy_time
 from standoff.evaluation.detection.coco import coco_figures
 from standoff.evaluation.detection.comparison import Comparison
+from standoff.evaluation.detection.points import PointScores
 from standoff.evaluation.detection.score import score_detections
 from standoff.evaluation.detection.trial import Candidate, TrialResult
 
@@ -24,6 +25,7 @@ def result(label: str, time_ms: float, seed: int) -> TrialResult:
         coco=coco_figures(truth, found, CLASSES),
         times_ms=np.array([time_ms]),
         ale_m={},
+        points=PointScores((), ()),
         unseen=(),
     )
 

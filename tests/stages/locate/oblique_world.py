@@ -25,8 +25,12 @@ def _pose() -> tuple[FloatArray, FloatArray]:
 
 def seen_px(xy_m: FloatArray, distortion: FloatArray | None = None) -> FloatArray:
     """Project (N, 2) ground points in front of the camera into the picture."""
+    return space_px(np.column_stack([xy_m, np.zeros(len(xy_m))]), distortion)
+
+
+def space_px(points: FloatArray, distortion: FloatArray | None = None) -> FloatArray:
+    """Project (N, 3) points in front of the camera into the picture."""
     rotation, translation = _pose()
-    points = np.column_stack([xy_m, np.zeros(len(xy_m))])
     lens = np.zeros(5) if distortion is None else distortion
     projected, _ = cv2.projectPoints(points, cv2.Rodrigues(rotation)[0], translation, MATRIX, lens)
     return np.asarray(projected, dtype=np.float64).reshape(-1, 2)

@@ -1,8 +1,10 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from stages.locate.oblique_world import SIZE_PX, ground_map, seen_px, standing, tracks_of
+from stages.locate.oblique_world import SIZE_PX, ground_map, seen_px, space_px, standing, tracks_of
 from tolerances import GEOMETRY_REL, GROUND_THROUGH_LENS_M
 
 from standoff.core import homography
@@ -235,3 +237,67 @@ def test_a_reset_forgets_and_leaves_other_streams_alone() -> None:
     tracks = tracks_of(standing(seen_px(GROUND_M[:1])))
     assert np.isnan(first.update(0.6, tracks, ground_map()).velocity_mps).all()
     assert np.isfinite(second.update(0.6, tracks, ground_map()).velocity_mps).all()
+
+
+def _pointed(boxes: FloatArray, foot_px: FloatArray, sigma_px: float) -> Tracks:
+    covariance_px2 = np.tile(sigma_px**2 * np.eye(2), (len(boxes), 1, 1))
+    return replace(tracks_of(boxes), foot_px=foot_px, foot_covariance_px2=covariance_px2)
+
+
+@pytest.mark.parametrize("lens", [None, LENS])
+def test_a_ground_point_goes_before_every_point_of_the_box_also_where_the_picture_cuts_it(
+    lens: FloatArray | None,
+) -> None:
+    foot_px = seen_px(GROUND_M, lens)
+    boxes = np.column_stack([foot_px - 90.0, foot_px + np.array([40.0, 30.0])])
+    boxes[0, 0] = -0.5
+    ground = ground_map(distortion=lens)
+    positions = Locator().update(0.0, _pointed(boxes, foot_px, 1.0), ground)
+    assert positions.valid.all()
+    np.testing.assert_allclose(positions.xy_m, GROUND_M, atol=GROUND_THROUGH_LENS_M)
+    for anchor in ("bottom_centre", "box_centre"):
+        by_box = Locator(LocateParams(anchor=anchor)).update(0.0, _pointed(boxes, foot_px, 1.0), ground)
+        assert np.abs(by_box.xy_m - GROUND_M)[by_box.valid].min() > 0.05
+    wider = Locator().update(0.0, _pointed(boxes, foot_px, 3.0), ground)
+    np.testing.assert_allclose(wider.covariance_m2, 9.0 * positions.covariance_m2, rtol=1e-6)
+
+
+def test_tracks_without_a_ground_point_stand_where_their_boxes_do() -> None:
+    boxes = standing(seen_px(GROUND_M))
+    some = _pointed(boxes, seen_px(GROUND_M) + 5.0, 1.0)
+    foot_px, covariance_px2 = some.foot_px.copy(), some.foot_covariance_px2.copy()
+    foot_px[1], covariance_px2[1] = np.nan, np.nan
+    mixed = Locator().update(0.0, replace(some, foot_px=foot_px, foot_covariance_px2=covariance_px2), ground_map())
+    plain = Locator().update(0.0, tracks_of(boxes), ground_map())
+    assert np.isclose(mixed.xy_m, plain.xy_m).all(axis=1).tolist() == [row == 1 for row in range(len(boxes))]
+    np.testing.assert_allclose(mixed.covariance_m2[1], plain.covariance_m2[1])
+
+
+def test_a_class_prior_finds_a_solid_block_from_any_side_and_admits_what_a_box_cannot_tell() -> None:
+    """A block as deep across the view as along it, so tall as the prior has it for a dump truck."""
+    deep_m, high_m = 5.0, 2.0
+    corners_m = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (0, 1)]) * [
+        deep_m / 2,
+        deep_m / 2,
+        high_m,
+    ]
+    boxes = []
+    for x_m, y_m in GROUND_M:
+        seen = space_px(corners_m + np.array([x_m, y_m, 0.0]))
+        boxes.append([*seen.min(axis=0), *seen.max(axis=0)])
+    truck = [3] * len(GROUND_M)
+    tracks = tracks_of(np.array(boxes), class_id=truck)
+    by_prior = Locator(LocateParams(anchor="class_prior")).update(0.0, tracks, ground_map())
+    by_bottom = Locator(LocateParams(anchor="bottom_centre")).update(0.0, tracks, ground_map())
+    off_m = np.linalg.norm(by_prior.xy_m - GROUND_M, axis=1)
+    assert (off_m < 0.5).all() and (off_m < 0.25 * np.linalg.norm(by_bottom.xy_m - GROUND_M, axis=1)).all()
+    assert (np.linalg.eigvalsh(by_prior.covariance_m2)[:, 0] >= 0.6**2).all()
+
+
+def test_a_class_prior_yields_to_the_detectors_own_point_and_leaves_people_at_their_feet() -> None:
+    boxes = standing(seen_px(GROUND_M))
+    prior = Locator(LocateParams(anchor="class_prior"))
+    own = prior.update(0.0, _pointed(boxes, seen_px(GROUND_M), 1.0), ground_map())
+    np.testing.assert_allclose(own.xy_m, GROUND_M, rtol=GEOMETRY_REL, atol=GEOMETRY_REL)
+    people = prior.update(0.0, tracks_of(boxes), ground_map())
+    assert (np.linalg.norm(people.xy_m - GROUND_M, axis=1) < 0.35).all()

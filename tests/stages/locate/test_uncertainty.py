@@ -47,5 +47,5 @@ def test_the_boxes_share_agrees_with_differences_of_the_whole_way_to_the_ground(
     variance_px2 = np.array([[4.0, 9.0], [1.0, 1.0], [25.0, 2.0]])
     jacobian = central_differences(lambda points: ground.to_ground(points)[0], seen)
     expected = np.einsum("nij,nj,nkj->nik", jacobian, variance_px2, jacobian)
-    found = own_covariance(ground, ground.undistorted(seen), variance_px2)
+    found = own_covariance(ground, ground.undistorted(seen), variance_px2[:, :, None] * np.eye(2))
     np.testing.assert_allclose(found, expected, rtol=NUMERICAL_DERIVATIVE_REL, atol=NUMERICAL_DERIVATIVE_REL)

@@ -58,7 +58,7 @@ def test_a_head_takes_the_anchors_of_its_mask() -> None:
         ("[maxpool]\nsize=4\nstride=4\n", r"a padding .* line 5 .*padding 3, size 4, stride 4"),
         ("[yolo]\nanchors=1,2,3\nnum=2\n", r"4 positive anchor sides \(num=2\) .* line 6 .*3 numbers"),
         ("[yolo]\nanchors=1,2\nmask=1\n", r"mask numbers from 0 to 0 .* line 7 .*\[1\]"),
-        ("[yolo]\nanchors=1,2\nclasses=3\n", r"one number of classes in a\.cfg, found 3, 2"),
+        ("[yolo]\nanchors=1,2\nclasses=3\n", r"one number of classes, .* in a\.cfg, found 3, 2"),
         ("just words\n", r"option=value at line 5 of a\.cfg, found 'justwords'"),
     ],
 )
@@ -94,3 +94,11 @@ def test_every_layer_of_the_shared_cfg_is_understood(shared_data: Path) -> None:
     cfg = read_cfg(shared_data / "weights" / "yolo-fastest-1.1-xl" / "yolo-fastest-1.1-xl.cfg")
     assert (len(cfg.layers), len(cfg.heads), cfg.width_px) == (131, 2, 320)
     assert cfg.heads[0].anchors_px == ((115.0, 73.0), (119.0, 199.0), (242.0, 238.0))
+
+
+def test_a_head_may_give_ground_points_in_four_more_values_of_each_anchor() -> None:
+    plain, pointed = (parse_cfg(NET + HEAD + option).heads[0] for option in ("", "ground_point=1\n"))
+    assert (plain.has_point, pointed.has_point) == (False, True)
+    assert pointed.values == plain.values + 4 == 5 + 2 + 4
+    with pytest.raises(ModelError, match="all with a ground point or none"):
+        parse_cfg(NET + HEAD + HEAD + "ground_point=1\n")

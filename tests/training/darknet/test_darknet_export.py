@@ -17,6 +17,7 @@ from standoff.core.errors import MissingDependency, ModelError, OutputError
 from standoff.stages.detect.model_card import ModelCard
 from standoff.training import export_darknet, yolov3_tiny_cfg
 from standoff.training.architectures import ARCHITECTURES
+from standoff.training.architectures.refitted import pointed_cfg
 from standoff.training.architectures.yolov3 import YOLOV3_ANCHORS_PX
 from standoff.training.darknet.cfg import read_cfg
 from standoff.training.darknet.network import DarknetNetwork, DecodedNetwork
@@ -212,3 +213,38 @@ def test_without_torch_the_export_says_what_to_install(monkeypatch: pytest.Monke
 def test_importing_training_does_not_import_torch() -> None:
     code = "import sys, standoff.training; sys.exit(int(bool({'torch', 'onnx'} & set(sys.modules))))"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_points_are_exported_beside_the_boxes_and_leave_them_as_they_were(
+    make_darknet_files: MakeFiles, tmp_path: Path, seed: int
+) -> None:
+    files = make_darknet_files(pointed_cfg(ALL_LAYERS), seed)
+    card = export_darknet(*files, None, tmp_path / "a.onnx")
+    network = DarknetNetwork(read_cfg(files.cfg))
+    load_weights(network, files.weights)
+    width_px, height_px = card.input_size_px
+    picture = np.random.default_rng(seed).random((1, 3, height_px, width_px), dtype=np.float32)
+    with torch.no_grad():
+        boxes, points = DecodedNetwork(network).eval().decode(network.eval()(torch.from_numpy(picture)))
+    session = onnxruntime.InferenceSession(tmp_path / "a.onnx", providers=["CPUExecutionProvider"])
+    found = dict(zip(("boxes", "points"), session.run(["boxes", "points"], {"picture": picture}), strict=True))
+    assert found["points"].shape == (*found["boxes"].shape[:2], 4)
+    assert (found["points"][..., 2:] > 0).all(), "errors are positive"
+    for name, expected in (("boxes", boxes), ("points", points)):
+        np.testing.assert_allclose(
+            found[name], expected.numpy(), rtol=tolerances.ONNX_LOGIT, atol=tolerances.ONNX_SIGMOID
+        )
+
+
+def test_a_point_of_zeros_lies_in_the_middle_of_its_cell_and_is_unsure_by_its_anchor(
+    make_darknet_files: MakeFiles,
+) -> None:
+    network = DarknetNetwork(read_cfg(make_darknet_files(pointed_cfg(ALL_LAYERS), 0).cfg))
+    for _, block in network.convolutions():
+        for parameter in block.parameters():
+            torch.nn.init.zeros_(parameter)
+    with torch.no_grad():
+        _, points = DecodedNetwork(network).eval().decode(network.eval()(torch.rand(1, 3, 32, 32)))
+    np.testing.assert_allclose(points[0, 3], [12, 4, 11, 7], rtol=1e-6)
+    np.testing.assert_allclose(points[0, -1], [30, 30, 3, 4], rtol=1e-6)

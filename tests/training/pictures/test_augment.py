@@ -148,3 +148,22 @@ def test_without_any_chance_a_picture_stays_as_it_is() -> None:
     sample = make_sample(np.random.default_rng(0), [picture], lambda _: 0, _load, SIZE_PX, params)
     np.testing.assert_array_equal(sample.image, draw_ellipses(picture.xyxy_px))
     np.testing.assert_allclose(sample.xyxy_px, picture.xyxy_px + 0.5, rtol=GEOMETRY_REL)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_ground_points_go_along_with_their_boxes(seed: int) -> None:
+    """Marked in the middle of each box, they are there in every sample where the box is whole."""
+    data = [replace(picture, foot_px=(picture.xyxy_px[:, :2] + picture.xyxy_px[:, 2:]) / 2) for picture in _drawn(seed)]
+    params = replace(CLEAN, mosaic=0.0, any_rotation_sources=("drawn",))
+    sample = make_sample(np.random.default_rng(seed), data, _uniform(data), _load, _SIZE_PX, params)
+    middle_px = (sample.xyxy_px[:, :2] + sample.xyxy_px[:, 2:]) / 2
+    whole = ((sample.xyxy_px > 0) & (sample.xyxy_px < [*_SIZE_PX, *_SIZE_PX])).all(axis=1)
+    np.testing.assert_allclose(sample.foot_px[whole], middle_px[whole], rtol=GEOMETRY_REL, atol=1e-6)
+    # Of a box that is cut off, the point stays where it was: on the side that is gone.
+    mosaic = make_sample(
+        np.random.default_rng(seed), data, _uniform(data), _load, _SIZE_PX, replace(params, mosaic=1.0)
+    )
+    sides_px = mosaic.xyxy_px[:, 2:] - mosaic.xyxy_px[:, :2]
+    off_px = np.abs(mosaic.foot_px - (mosaic.xyxy_px[:, :2] + mosaic.xyxy_px[:, 2:]) / 2)
+    assert (off_px <= 0.5 * sides_px / params.drop_share).all()
+    assert np.isnan(_make(seed, params).foot_px).all(), "unmarked points stay unknown"

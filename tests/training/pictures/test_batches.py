@@ -89,7 +89,8 @@ def test_samples_are_stacked_red_first_with_their_boxes(drawn: list[LabelledPict
     samples = []
     for number, picture in enumerate(drawn[:3]):
         image = np.full((90, 160, 3), (10, 20, 200), np.uint8)
-        samples.append(Sample(image, picture.xyxy_px[:number], picture.class_id[:number], picture.ignored[:number]))
+        boxes, classes, ignored = picture.xyxy_px[:number], picture.class_id[:number], picture.ignored[:number]
+        samples.append(Sample(image, boxes, classes, ignored, picture.foot_px[:number]))
     batch = stack_samples(samples)
     assert batch.pictures[1, :, 40, 80].tolist() == [200, 20, 10]
     assert batch.picture.tolist() == [1, 2, 2]

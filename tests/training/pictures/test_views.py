@@ -175,3 +175,14 @@ def test_people_are_known_by_what_their_class_is_called() -> None:
     assert AugmentParams().for_classes(("excavator", "Person", "worker", "tree")).person_classes == (1, 2)
     assert AugmentParams().for_classes(("tree", "kite")).person_classes == ()
     assert AugmentParams(person_classes=(0,)).for_classes(("car", "person")).person_classes == (0,)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_points_go_where_the_middles_of_boxes_go_even_beyond_the_view(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    boxes_px = draw_boxes(rng)
+    view = draw_view(rng, label(boxes_px), _VIEW_PX, _TURNING if seed % 2 else AugmentParams())
+    carried_px = view.carry(boxes_px)
+    middle_px = view.carry_points((boxes_px[:, :2] + boxes_px[:, 2:]) / 2)
+    np.testing.assert_allclose(middle_px, (carried_px[:, :2] + carried_px[:, 2:]) / 2, rtol=GEOMETRY_REL, atol=1e-9)
+    assert np.isnan(view.carry_points(np.full((2, 2), np.nan))).all()

@@ -159,12 +159,12 @@ def test_frozen_statistics_stay_while_the_kernels_move(data: LabelledData, tmp_p
 
 def test_the_backbone_waits_for_the_freeze_to_end() -> None:
     network = _network()
-    set_trainable(network, frozen=2, backbone_layers=2, frozen_norm=False)
+    set_trainable(network, frozen=2, frozen_norm=0)
     trainable = {
         index for index, block in enumerate(network.blocks) if any(p.requires_grad for p in block.parameters())
     }
     assert trainable == {2, 4}
-    set_trainable(network, frozen=0, backbone_layers=2, frozen_norm=False)
+    set_trainable(network, frozen=0, frozen_norm=0)
     assert all(parameter.requires_grad for parameter in network.parameters())
 
 

@@ -39,6 +39,7 @@ def _batch(boxes: list[list[float]], class_id: list[int], picture: list[int], ig
         boxes=torch.tensor(boxes, dtype=torch.float32).reshape(-1, 4),
         class_id=torch.tensor(class_id, dtype=torch.int64),
         ignored=torch.tensor(ignored, dtype=torch.bool),
+        feet=torch.full((len(boxes), 2), torch.nan),
         picture=torch.tensor(picture, dtype=torch.int64),
     )
 
@@ -186,6 +187,7 @@ def test_twice_the_same_pictures_give_the_same_loss() -> None:
         boxes=torch.cat([one.boxes] * 2),
         class_id=torch.cat([one.class_id] * 2),
         ignored=torch.cat([one.ignored] * 2),
+        feet=torch.full((2 * len(one.boxes), 2), torch.nan),
         picture=torch.tensor([0, 1]),
     )
     doubled = tuple(torch.cat([head] * 2) for head in heads)

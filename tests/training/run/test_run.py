@@ -41,16 +41,16 @@ class _Heard:
         return Listener(self.messages.append, lambda *_: None, self.rows.append)
 
 
-def _plan(folder: Path, **changes: object) -> RunPlan:
+def _plan(folder: Path, *, points: bool = False, **changes: object) -> RunPlan:
     (folder / "small.cfg").write_text(CFG)
     data = folder / "blocks"
-    return RunPlan(write_data(data), str(folder / "small.cfg"), None, small_params(**changes))
+    return RunPlan(write_data(data, points=points), str(folder / "small.cfg"), None, small_params(**changes))
 
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[RunPlan, Path, _Heard]:
     folder = tmp_path_factory.mktemp("finished")
-    plan, heard = _plan(folder, steps=60, validate_every=20, checkpoint_every=20, ema=0.9), _Heard()
+    plan, heard = _plan(folder, points=True, steps=90, validate_every=30, checkpoint_every=30, ema=0.9), _Heard()
     train_detector(plan, folder / "run", heard.listener())
     return plan, folder / "run", heard
 
@@ -85,6 +85,15 @@ def test_the_exported_model_sees_what_the_network_sees(finished: tuple[RunPlan, 
         assert len(seen) == len(own) > 0
         np.testing.assert_allclose(seen.xyxy_px, own.xyxy_px, atol=FLOAT32_BOX_PX)
         np.testing.assert_array_equal(seen.class_id, site_class[own.class_id])
+        np.testing.assert_allclose(seen.foot_px, own.foot_px, atol=FLOAT32_BOX_PX)
+        np.testing.assert_allclose(seen.foot_covariance_px2, own.foot_covariance_px2, rtol=1e-3, atol=1e-3)
+
+
+def test_labels_with_ground_points_give_heads_that_learn_them(finished: tuple[RunPlan, Path, _Heard]) -> None:
+    _, out, heard = finished
+    assert "ground_point=1" in (out / "network.cfg").read_text()
+    losses = [row["loss_points"] for row in heard.rows]
+    assert 0.0 < losses[-1] < losses[0]
 
 
 def test_the_run_can_be_repeated_from_its_own_record(finished: tuple[RunPlan, Path, _Heard], tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from torch import Tensor
 from standoff.core.errors import ModelError
 from standoff.training import yolo_fastest_xl_cfg, yolov3_cfg, yolov3_tiny_cfg
 from standoff.training.architectures import Anchors
+from standoff.training.architectures.refitted import pointed_cfg
 from standoff.training.architectures.yolo_fastest import YOLO_FASTEST_ANCHORS_PX
 from standoff.training.darknet.cfg import parse_cfg
 from standoff.training.darknet.network import DarknetNetwork, DecodedNetwork
@@ -19,6 +20,8 @@ from standoff.training.start.initial_weights import initialize_layers
 from standoff.training.start.transfer import Transferred, transfer_weights
 
 SITE = ("worker", "excavator", "dump_truck", "vehicle", "reference")
+_DOUBLE_PX = (((5.0, 9.0), (14.0, 20.0), (40.0, 50.0)), ((60.0, 140.0), (110.0, 80.0), (250.0, 230.0)))
+_TWICE_PX = tuple(tuple((1.2 * width, 0.9 * height) for width, height in head) for head in _DOUBLE_PX)
 OTHER_ANCHORS_PX = (((5.0, 9.0), (14.0, 20.0), (40.0, 50.0)), ((60.0, 140.0), (110.0, 80.0), (250.0, 230.0)))
 
 
@@ -211,3 +214,31 @@ def test_the_published_weights_keep_seeing_people_after_the_transfer(shared_data
     assert (len(transferred.copied), len(transferred.resized), transferred.fresh) == (82, 2, ())
     # The last anchor of the coarse head is (250, 230) instead of (242, 238).
     torch.testing.assert_close(_rows(site)[2:300:3, :6], _rows(coco)[2:300:3, :6])
+
+
+def _points(network: DarknetNetwork) -> Tensor:
+    cfg = network.cfg
+    picture = torch.rand(1, 3, cfg.height_px, cfg.width_px, generator=torch.Generator().manual_seed(3))
+    with torch.no_grad():
+        points: Tensor = DecodedNetwork(network).decode(network.eval()(picture))[1]
+    return points[0]
+
+
+def test_points_are_kept_in_pixels_whatever_the_new_anchors_are(tmp_path: Path) -> None:
+    text, other = (pointed_cfg(yolo_fastest_xl_cfg(5, 96, 64, anchors_px)) for anchors_px in (_DOUBLE_PX, _TWICE_PX))
+    source = _trained(text, tmp_path / "run.weights")
+    target = _network(other)
+    transfer_weights(target, tmp_path / "run.weights", tmp_path / "run.cfg")
+    torch.testing.assert_close(_points(target), _points(source), rtol=1e-4, atol=1e-3)
+    torch.testing.assert_close(_rows(target), _rows(source))
+
+
+def test_a_head_that_learns_points_anew_begins_below_the_middle_and_unsure(tmp_path: Path) -> None:
+    source = _trained(yolo_fastest_xl_cfg(5, 96, 64), tmp_path / "run.weights")
+    target = _network(pointed_cfg(yolo_fastest_xl_cfg(5, 96, 64)))
+    assert transfer_weights(target, tmp_path / "run.weights", tmp_path / "run.cfg").resized == (120, 129)
+    torch.testing.assert_close(_rows(target), _rows(source))
+    points, anchors_px = _points(target)[:3], torch.tensor(target.cfg.heads[0].anchors_px)
+    middle_px = torch.tensor([16.0, 16.0])
+    torch.testing.assert_close((points[:, :2] - middle_px) / anchors_px, torch.tensor([[0.0, 0.25]]).expand(3, -1))
+    assert (points[:, 2:] > 0.2 * anchors_px).all()

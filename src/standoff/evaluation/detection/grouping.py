@@ -38,7 +38,11 @@ class Grouping:
         position = np.where(ignored, 0, self.position[picture.class_id])
         kept = ignored | (position != _GONE)
         return replace(
-            picture, xyxy_px=picture.xyxy_px[kept], class_id=position[kept].astype(np.int64), ignored=ignored[kept]
+            picture,
+            xyxy_px=picture.xyxy_px[kept],
+            class_id=position[kept].astype(np.int64),
+            ignored=ignored[kept],
+            foot_px=picture.foot_px[kept],
         )
 
     def found(self, detections: Detections) -> Detections:

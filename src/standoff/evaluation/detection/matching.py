@@ -33,6 +33,9 @@ class Matches:
         truth_class_id: (T,).
         truth_picture: (T,).
         pictures: How many.
+        foot_px: (D, 2) ground points of detections; NaN where there is none.
+        foot_covariance_px2: (D, 2, 2) of them as the detector states it; NaN with it.
+        truth_foot_px: (T, 2) true ground points; NaN where none is marked.
     """
 
     xyxy_px: FloatArray
@@ -46,6 +49,9 @@ class Matches:
     truth_class_id: IntArray
     truth_picture: IntArray
     pictures: int
+    foot_px: FloatArray
+    foot_covariance_px2: FloatArray
+    truth_foot_px: FloatArray
 
 
 def match_detections(truth: Sequence[LabelledPicture], found: Sequence[Detections], iou: float) -> Matches:
@@ -92,6 +98,11 @@ def match_detections(truth: Sequence[LabelledPicture], found: Sequence[Detection
         truth_class_id=_joined([one.class_id[real] for one, real in zip(truth, owned, strict=True)]).astype(np.int64),
         truth_picture=np.repeat(np.arange(len(truth)), [int(real.sum()) for real in owned]),
         pictures=len(truth),
+        foot_px=_joined([one.foot_px[order] for one, order in zip(found, orders, strict=True)], (0, 2)),
+        foot_covariance_px2=_joined(
+            [one.foot_covariance_px2[order] for one, order in zip(found, orders, strict=True)], (0, 2, 2)
+        ),
+        truth_foot_px=_joined([one.foot_px[real] for one, real in zip(truth, owned, strict=True)], (0, 2)),
     )
 
 

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from itertools import chain
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
+from standoff.core.boxes import unknown_points
 from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.errors import ConfigError, DataError
 from standoff.core.homography import BoolArray, FloatArray
+from standoff.core.pose import View
 from standoff.core.types import Frame, IntArray
 from standoff.evaluation.paper.clip import Clip, load_clip
 from standoff.evaluation.paper.clip_tables import read_table
@@ -23,9 +25,14 @@ from standoff.labels.problems import readable_pictures
 from standoff.labels.site_classes import to_site_classes
 from standoff.labels.splits import spread_rows
 from standoff.labels.types import LabelledPicture, Problem, Split
+from standoff.labels.views import GroundView, views_of
 from standoff.stages.frames import frame_from_array, open_source
+from standoff.stages.ground import load_camera
 
-_VISIBLE = ("frame", "entity_id", "class_id", "x1_px", "y1_px", "x2_px", "y2_px", "visible_share", "visible_px")
+_VISIBLE = (
+    *("frame", "entity_id", "class_id", "x1_px", "y1_px", "x2_px", "y2_px", "visible_share", "visible_px"),
+    *("foot_x_px", "foot_y_px"),
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,6 +47,7 @@ class Material:
         clip: The simulated clip that they are from; None otherwise.
         problems: Of the labels and the pictures; what is left out is in no other field.
         is_whole: All splits of a data set.
+        views: How pictures show the ground, by their position in `truth`; those of which nobody knows are missing.
     """
 
     name: str
@@ -49,6 +57,7 @@ class Material:
     clip: Clip | None = None
     problems: tuple[Problem, ...] = ()
     is_whole: bool = False
+    views: Mapping[int, GroundView] = field(default_factory=dict)
 
 
 def labelled_pictures(
@@ -98,7 +107,8 @@ def labelled_pictures(
 
     name = f"{path.resolve().name}, {split}"
     problems = (*data.problems, *unreadable)
-    return Material(name, truth, frames, chosen, problems=problems, is_whole=split == "all")
+    views = views_of([picture.path for picture in truth])
+    return Material(name, truth, frames, chosen, problems=problems, is_whole=split == "all", views=views)
 
 
 def simulated_clip(folder: Path, limit: int | None = None) -> Material:
@@ -116,14 +126,21 @@ def simulated_clip(folder: Path, limit: int | None = None) -> Material:
     rows = read_table(folder / "truth.parquet", _VISIBLE)
     seen = rows["visible_px"] > 0
     boxes_px = np.column_stack([rows[name] for name in ("x1_px", "y1_px", "x2_px", "y2_px")]).astype(np.float64)
+    foot_px = np.column_stack([rows["foot_x_px"], rows["foot_y_px"]]).astype(np.float64)
     ignored = ~would_be_marked(boxes_px, rows["visible_px"], rows["visible_share"])
     chosen = spread_rows(clip.frame_count, limit)
     size_px = _size_px(clip.video)
     truth = []
     for frame in chosen:
         here = seen & (rows["frame"] == frame)
-        truth.append(_in_video(clip.video, size_px, boxes_px[here], rows["class_id"][here], ignored[here]))
-    return Material(clip.name, tuple(truth), lambda: _video_frames(clip.video, chosen), chosen, clip)
+        boxes = _Boxes(boxes_px[here], rows["class_id"][here], ignored[here], foot_px[here])
+        truth.append(_in_video(clip.video, size_px, boxes))
+    camera = load_camera(folder / "camera.yaml")
+    views = {
+        position: GroundView(View(camera, clip.camera_m[frame], clip.site_to_camera[frame]), 0.0)
+        for position, frame in enumerate(chosen.tolist())
+    }
+    return Material(clip.name, tuple(truth), lambda: _video_frames(clip.video, chosen), chosen, clip, views=views)
 
 
 def video_with_people(
@@ -158,7 +175,9 @@ def video_with_people(
     truth = []
     for frame in chosen:
         here = inside & (rows["frame"] == frame + 1)
-        truth.append(_in_video(video, size_px, boxes_px[here], people[here], rows["conf"][here] <= 0))
+        nowhere_px = unknown_points(int(here.sum()))
+        boxes = _Boxes(boxes_px[here], people[here], rows["conf"][here] <= 0, nowhere_px)
+        truth.append(_in_video(video, size_px, boxes))
     return Material(f"{video.name}, frames {first}-{last}", tuple(truth), lambda: _video_frames(video, chosen), chosen)
 
 
@@ -196,19 +215,27 @@ def _size_px(video: Path) -> tuple[int, int]:
         return source.size_px
 
 
-def _in_video(
-    video: Path, size_px: tuple[int, int], boxes_px: FloatArray, class_id: IntArray, ignored: BoolArray
-) -> LabelledPicture:
+class _Boxes(NamedTuple):
+    """What is in a frame: (N, 4), (N,), (N,), and (N, 2) ground points."""
+
+    xyxy_px: FloatArray
+    class_id: IntArray
+    ignored: BoolArray
+    foot_px: FloatArray
+
+
+def _in_video(video: Path, size_px: tuple[int, int], boxes: _Boxes) -> LabelledPicture:
     """Return a frame of a video, its boxes clipped to the picture, those outside it left out."""
     edges_px = np.array([*size_px, *size_px]) - 0.5
-    inside_px = np.clip(boxes_px, -0.5, edges_px)
+    inside_px = np.clip(boxes.xyxy_px, -0.5, edges_px)
     kept = (inside_px[:, 2:] > inside_px[:, :2]).all(axis=1)
     return LabelledPicture(
         path=video,
         size_px=size_px,
         xyxy_px=inside_px[kept],
-        class_id=class_id[kept].astype(np.int64),
-        ignored=ignored[kept],
+        class_id=boxes.class_id[kept].astype(np.int64),
+        ignored=boxes.ignored[kept],
+        foot_px=boxes.foot_px[kept],
         group=video.stem,
         source=video.stem,
     )

@@ -19,6 +19,7 @@ from standoff.evaluation.detection.coco import MOST_OF_A_CLASS, CocoFigures, coc
 from standoff.evaluation.detection.grouping import Grouping
 from standoff.evaluation.detection.localisation import ale_by_class_m
 from standoff.evaluation.detection.material import Material
+from standoff.evaluation.detection.points import PointScores, score_points
 from standoff.evaluation.detection.score import DetectionScore, score_detections
 from standoff.stages.detect import DetectParams, OnnxDetector
 
@@ -65,6 +66,7 @@ class TrialResult:
         coco: By COCO's.
         times_ms: (N,) of each picture: scaling, inference and suppression; reading the picture is not in it.
         ale_m: Paper Eq. 3 by class; empty without truth in metres.
+        points: How well ground points lie; empty where the model tells none or the truth knows none.
         unseen: Scored classes that have truth and that the model does not know: their AP is 0.
     """
 
@@ -74,6 +76,7 @@ class TrialResult:
     coco: CocoFigures
     times_ms: FloatArray
     ale_m: Mapping[str, float]
+    points: PointScores
     unseen: tuple[str, ...]
 
     @property
@@ -98,6 +101,7 @@ class TrialResult:
             "score": self.score.to_dict(),
             "coco": self.coco.to_dict(),
             "ale_m": dict(self.ale_m),
+            "points": self.points.to_dict(),
         }
 
 
@@ -184,6 +188,7 @@ def try_candidate(
         coco=coco_figures(truth, found, grouping.classes),
         times_ms=times_ms,
         ale_m=ale_by_class_m(score, material),
+        points=score_points(score, material.views),
         unseen=_unseen(score, grouping, set(description["class_map"].values())),
     )
 

@@ -198,7 +198,7 @@ def _background(
 def _read_labels(path: Path, names: Mapping[int, str]) -> tuple[FloatArray, list[str]]:
     """Return the boxes (N, 4) of a photograph's YOLO label file, and what each is."""
     try:
-        numbers, xyxy_px = read_boxes(path, read_size_px(path))
+        numbers, xyxy_px, _ = read_boxes(path, read_size_px(path))
     except BadPicture as error:
         raise DataError(
             expected=f"a photograph with labels in {path}", found=str(error), fix="check the folder"

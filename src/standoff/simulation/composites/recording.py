@@ -133,7 +133,8 @@ def open_compositor(plan: CompositePlan) -> Generator[Callable[[int], Picture], 
             image = _photograph(rng, image, condition)
             jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, int(rng.choice(_QUALITIES))])[1]
             ignored = [(float(a), float(b), float(c), float(d)) for a, b, c, d in framed.ignored_px]
-            return Picture(f"c{plan.seed}-{background.group}-{index:05d}.jpg", jpeg.tobytes(), size_px, rows, ignored)
+            name = f"c{plan.seed}-{background.group}-{index:05d}.jpg"
+            return Picture(name, jpeg.tobytes(), size_px, rows, ignored, view=framed.view)
 
         yield make
 

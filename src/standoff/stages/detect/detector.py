@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -12,6 +13,7 @@ from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import Detections, Frame, ImageArray, IntArray
 from standoff.stages.detect.class_map import map_classes
+from standoff.stages.detect.feet import feet_of
 from standoff.stages.detect.letterbox import Letterbox, resize
 from standoff.stages.detect.model_card import file_sha256
 from standoff.stages.detect.network import Network
@@ -104,7 +106,7 @@ class OnnxDetector:
     def _joined(self, found: list[Detections], cut: list[BoolArray], frame_size_px: tuple[int, int]) -> Detections:
         """Make one of what the whole frame, which comes first, and its slices show."""
         params = self._params
-        detections, is_cut = _stacked(found), np.concatenate(cut)
+        detections, is_cut = Detections.joined(found), np.concatenate(cut)
         is_whole_frame = np.arange(len(detections)) < len(found[0])
         held_px = held_whole_px(frame_size_px, params.slices, params.slice_overlap)
         is_small = (detections.xyxy_px[:, 2:] - detections.xyxy_px[:, :2] <= held_px).all(axis=1)
@@ -121,8 +123,8 @@ class OnnxDetector:
         # The least threshold of all is the least that matters.
         candidates = self._network.candidates(resized, letterbox, self._thresholds.min())
         found = self._classified(candidates, letterbox)
-        shift = np.array([view.left_px, view.top_px, view.left_px, view.top_px])
-        found = Detections(found.xyxy_px + shift, found.score, found.class_id)
+        shift = np.array([view.left_px, view.top_px])
+        found = replace(found, xyxy_px=found.xyxy_px + np.tile(shift, 2), foot_px=found.foot_px + shift)
         inner_px = letterbox.inner_size_px
         margin_px = (
             _CUT_MARGIN_INPUT_PX * view.width_px / inner_px[0],
@@ -139,7 +141,7 @@ class OnnxDetector:
         class_id = np.array(list(self._columns), dtype=np.int64)[best]
         xyxy_px = letterbox.to_source(candidates.xyxy_px)
         wanted = (score >= self._thresholds[class_id]) & (xyxy_px[:, 2:] > xyxy_px[:, :2]).all(axis=1)
-        found = Detections(xyxy_px[wanted], score[wanted], class_id[wanted])
+        found = Detections(xyxy_px, score, class_id, *feet_of(candidates, letterbox))[wanted]
         return suppress(found, self._iou_in_view, self._params.max_detections)
 
 
@@ -148,11 +150,3 @@ def _resized(frame: Frame, view: View, size_px: tuple[int, int]) -> ImageArray:
         return frame.picture.resized_bgr(*size_px)
     part = frame.image[view.top_px : view.top_px + view.height_px, view.left_px : view.left_px + view.width_px]
     return resize(part, size_px)
-
-
-def _stacked(parts: list[Detections]) -> Detections:
-    return Detections(
-        np.concatenate([part.xyxy_px for part in parts]),
-        np.concatenate([part.score for part in parts]),
-        np.concatenate([part.class_id for part in parts]),
-    )

@@ -10,7 +10,7 @@ import numpy.typing as npt
 import onnxruntime
 
 from standoff.core.errors import ModelError
-from standoff.stages.detect.model_card import INPUT_NAME, OUTPUT_NAME, ModelCard
+from standoff.stages.detect.model_card import INPUT_NAME, OUTPUT_NAME, POINTS_NAME, ModelCard
 
 _PICTURE_TYPES: Final[dict[str, type[np.generic]]] = {
     "tensor(float)": np.float32,
@@ -19,6 +19,7 @@ _PICTURE_TYPES: Final[dict[str, type[np.generic]]] = {
 }
 _SIZE_TYPES: Final[dict[str, type[np.generic]]] = {"tensor(int64)": np.int64, "tensor(int32)": np.int32}
 _YOLO_COLUMNS: Final = 5
+_POINT_COLUMNS: Final = 4
 _YOLOX_STRIDES_PX: Final = (8, 16, 32)
 
 
@@ -96,6 +97,8 @@ def check_own_graph(session: onnxruntime.InferenceSession, card: ModelCard, name
     found = {node.name: node.shape for node in (*session.get_inputs(), *session.get_outputs())}
     rows = next(iter(found.get(OUTPUT_NAME, [])[1:2]), "N")
     expected = {INPUT_NAME: [1, 3, height_px, width_px], OUTPUT_NAME: [1, rows, _YOLO_COLUMNS + len(card.classes)]}
+    if POINTS_NAME in found:
+        expected[POINTS_NAME] = [1, rows, _POINT_COLUMNS]
     if found != expected:
         raise ModelError(
             expected=f"the tensors {expected} in {name}, as its metadata says",

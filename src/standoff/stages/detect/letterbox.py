@@ -121,6 +121,16 @@ class Letterbox:
         boxes_px: FloatArray = np.clip(edges_px, 0.0, source) - 0.5
         return boxes_px
 
+    def points_to_source(self, points_input_px: FloatArray) -> FloatArray:
+        """Carry (N, 2) points of the input, counted as its boxes are, to the picture; they may lie outside of it."""
+        points_px: FloatArray = (points_input_px - self.offset_px) * self.source_px_per_input_px - 0.5
+        return points_px
+
+    @property
+    def source_px_per_input_px(self) -> FloatArray:
+        """(2,) how much larger the picture is, across and down."""
+        return np.array(self.source_size_px, dtype=np.float64) / self.inner_size_px
+
 
 def resize(image: ImageArray, size_px: tuple[int, int]) -> ImageArray:
     """Scale a picture to (width, height): by areas when it shrinks, so that nothing small is lost between samples."""

@@ -1,12 +1,14 @@
 """What a detector's ONNX file says about itself, written by the export and read by the detector.
 
 The metadata of the file holds one text a key: `standoff_format`, and as JSON `classes`, `anchors_px`,
-`input_size_px`, `preprocessing`, `output` and `sources`. The graph has one input and one output:
+`input_size_px`, `preprocessing`, `output` and `sources`. The graph has one input, and one output or two:
 
 - input `picture`: (1, 3, height, width) float32 or float16, RGB, 0 to 1, the picture letterboxed: scaled to fit without
   changing its aspect ratio, in the middle, the rest 0.5 as in Darknet;
 - output `boxes`: (1, N, 5 + classes): centre x, y, width, height in input pixels, where 0 is the left or
-  top edge of the first pixel; objectness; the probability of each class given an object.
+  top edge of the first pixel; objectness; the probability of each class given an object;
+- output `points`, of networks that have learnt it: (1, N, 4): where the middle of the thing's footprint appears, x and
+  y, and their standard errors, in input pixels; NaN in rows of a joined network that has not.
 """
 
 from __future__ import annotations
@@ -24,6 +26,7 @@ FORMAT_KEY: Final = "standoff_format"
 FORMAT: Final = "1"
 INPUT_NAME: Final = "picture"
 OUTPUT_NAME: Final = "boxes"
+POINTS_NAME: Final = "points"
 PREPROCESSING: Final = {"colour": "RGB", "divide_by": 255, "letterbox_grey": 0.5}
 OUTPUT_COLUMNS: Final = ("centre_x_px", "centre_y_px", "width_px", "height_px", "objectness", "class probabilities")
 _FIX: Final = "make the file with `standoff export`"

@@ -13,7 +13,7 @@ from standoff.core.types import ImageArray
 from standoff.stages.detect.graph import GraphInputs, check_own_graph, suggested_description
 from standoff.stages.detect.interface import Interface, read_interface
 from standoff.stages.detect.letterbox import Letterbox, Preprocessing
-from standoff.stages.detect.model_card import FORMAT_KEY, OUTPUT_NAME, ModelCard
+from standoff.stages.detect.model_card import FORMAT_KEY, OUTPUT_NAME, POINTS_NAME, ModelCard
 from standoff.stages.detect.outputs import (
     Candidates,
     Output,
@@ -60,7 +60,7 @@ class Network:
             self._fix = f"correct `family: {family}` or the rest of {description}, or export the model again"
         self._preprocessing = _fitting_type(self.interface.preprocessing, self._inputs, path.name)
         self._constant = self._inputs.constant_feed(self.interface.input_size_px)
-        self._reader = OutputReader((OUTPUT_NAME,), read_rows) if is_own else self._reader_from_trial()
+        self._reader = self._own_reader() if is_own else self._reader_from_trial()
 
     @property
     def providers(self) -> list[str]:
@@ -97,6 +97,10 @@ class Network:
         feed = {self._inputs.picture: picture.astype(self._inputs.dtype, copy=False), **self._constant}
         outputs: list[Output] = self._session.run(list(names), feed)
         return outputs
+
+    def _own_reader(self) -> OutputReader:
+        has_points = POINTS_NAME in {node.name for node in self._session.get_outputs()}
+        return OutputReader((OUTPUT_NAME, POINTS_NAME) if has_points else (OUTPUT_NAME,), read_rows)
 
     def _reader_from_trial(self) -> OutputReader:
         """Find out how to read a foreign network, by showing it a grey picture."""

@@ -14,13 +14,14 @@ Which output is which is seen from the shapes that a trial run gives, or said by
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 from scipy.special import expit
 
+from standoff.core.boxes import unknown_points
 from standoff.core.homography import FloatArray
 from standoff.stages.detect.interface import Interface
 
@@ -55,10 +56,14 @@ class Candidates:
     Attributes:
         xyxy_px: (N, 4) left, top, right, bottom in the network's input; 0 is the edge of its first pixel.
         probability: (N, C) of each label, 0 to 1.
+        foot_px: (N, 2) ground points in the network's input; left out: the network gives none.
+        foot_sigma_px: (N, 2) their standard errors across and down.
     """
 
     xyxy_px: FloatArray
     probability: npt.NDArray[np.floating]
+    foot_px: FloatArray = field(default_factory=lambda: unknown_points(0))
+    foot_sigma_px: FloatArray = field(default_factory=lambda: unknown_points(0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,16 +80,21 @@ class OutputReader:
 
 
 def read_rows(outputs: list[Output], least: float) -> Candidates:
-    """Read rows of centre, size, objectness and class probabilities.
+    """Read rows of centre, size, objectness and class probabilities, and their ground points.
 
     Args:
-        outputs: One, (1, N, 5 + C), in input pixels.
+        outputs: (1, N, 5 + C) in input pixels; and of networks with points (1, N, 4), see `model_card`.
         least: Rows whose objectness is smaller are left out: no class can be surer than the object itself.
     """
     rows = outputs[0][0]
     # NaN stays in, to be noticed.
-    rows = rows[~(rows[:, 4] < least)].astype(np.float32, copy=False)
-    return _candidates(rows[:, 0:2].astype(np.float64), rows[:, 2:4].astype(np.float64), _probability(rows))
+    wanted = ~(rows[:, 4] < least)
+    rows = rows[wanted].astype(np.float32, copy=False)
+    found = _candidates(rows[:, 0:2].astype(np.float64), rows[:, 2:4].astype(np.float64), _probability(rows))
+    if len(outputs) == 1:
+        return found
+    points = outputs[1][0][wanted].astype(np.float64)
+    return replace(found, foot_px=points[:, :2], foot_sigma_px=points[:, 2:])
 
 
 def find_reader(interface: Interface, trial: Mapping[str, Output], knows_size: bool) -> OutputReader:

@@ -74,7 +74,8 @@ def join_cut(detections: Detections, cut: BoolArray, least_overlap: float) -> De
 
     A piece is a cut box of the same class that overlaps a larger box by at least `least_overlap` of the
     smaller of the two. The larger box takes the higher score; if it is a piece itself, it grows around
-    the other. Boxes that no slice cut are never taken in: a worker in front of another stays.
+    the other, and the surest of their ground points is that of all. Boxes that no slice cut are never taken in:
+    a worker in front of another stays.
 
     Args:
         detections: Boxes of all views, without zero areas.
@@ -87,6 +88,8 @@ def join_cut(detections: Detections, cut: BoolArray, least_overlap: float) -> De
     largest_first = np.argsort(-areas_px2(detections.xyxy_px), kind="stable")
     detections, cut = detections[largest_first], cut[largest_first]
     boxes, score = detections.xyxy_px.copy(), detections.score.copy()
+    doubt_px2 = np.nan_to_num(np.trace(detections.foot_covariance_px2, axis1=1, axis2=2), nan=np.inf)
+    surest = np.arange(len(detections))
     kept = np.ones(len(detections), dtype=np.bool_)
     pieces = np.flatnonzero(cut)
     smaller = np.minimum(areas_px2(boxes)[:, None], areas_px2(boxes[pieces]))
@@ -102,4 +105,7 @@ def join_cut(detections: Detections, cut: BoolArray, least_overlap: float) -> De
         if cut[index]:
             boxes[index, :2] = np.minimum(boxes[index, :2], boxes[own, :2].min(axis=0))
             boxes[index, 2:] = np.maximum(boxes[index, 2:], boxes[own, 2:].max(axis=0))
-    return replace(detections, xyxy_px=boxes, score=score)[kept]
+            together = np.append(index, own)
+            surest[index] = together[doubt_px2[together].argmin()]
+    feet = {name: getattr(detections, name)[surest] for name in ("foot_px", "foot_covariance_px2")}
+    return replace(detections, xyxy_px=boxes, score=score, **feet)[kept]

@@ -8,6 +8,7 @@ from standoff.core import homography
 from standoff.core.classes import CLASSES
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import GroundMap, GroundPositions, NoGroundMap, TextArray, Tracks
+from standoff.stages.locate import class_prior
 from standoff.stages.locate.params import LocateParams
 from standoff.stages.locate.region import inside
 from standoff.stages.locate.uncertainty import factor, horizon_margin, map_jacobian, own_covariance
@@ -19,13 +20,17 @@ BEYOND_HORIZON = "beyond the horizon"
 NEAR_HORIZON = "too near the horizon"
 OUTSIDE_MAP = "outside the ground map"
 
+_TOP_COUNTS_BELOW = 0.9
+"""Level in the box below which an anchor moves with the upper edge by more than with anything else."""
+_OWN_POINT_FIRST = frozenset({"ground_point", "class_prior"})
+
 
 class Locator:
     """Place each track of one stream on the ground.
 
-    One point of the box stands for the entity and is taken to lie on the ground plane. For a machine
-    seen from above the bottom of the box is its near side, not its middle: the covariance covers the
-    error of the box, not this.
+    One point stands for the entity and is taken to lie on the ground plane: the detector's own ground point, whose
+    error it states, or where it gives none a point of the box. For a machine seen from above the bottom of the box is
+    its near side, not its middle: there the covariance covers the error of the box, not this.
 
     Args:
         params: Settings; the defaults when left out.
@@ -49,7 +54,7 @@ class Locator:
 
         Returns:
             Row i belongs to track i. A row is invalid, with its reason, when there is no map, when the
-            box may go on outside the picture so that its anchor was not seen, and when the anchor is
+            box may go on outside the picture so that its anchor was not seen (a ground point knows), and when it is
             outside the lens model, at or beyond the horizon, or outside the map's polygon. Velocity
             comes from observed positions of one site frame only, not from coasting ones, and is NaN where invalid.
         """
@@ -64,15 +69,18 @@ class Locator:
                 # Places of two site frames make no motion.
                 self._velocities.reset()
                 self._site_frame = ground.site_frame
-            points_px = ground.undistorted(self._anchors(tracks))
-            variance_px2 = self._anchor_variance(tracks, coasted_s)
+            level = self._levels(tracks, ground)
+            seen_px, seen_covariance_px2 = self._standing(tracks, level, coasted_s)
+            points_px = ground.undistorted(seen_px)
             root = self._root(ground)
-            reason = self._reasons(tracks, ground, points_px, horizon_margin(ground, root, points_px, variance_px2))
+            margin = horizon_margin(ground, root, points_px, seen_covariance_px2)
+            reason = self._reasons(tracks, level, ground, points_px, margin)
             points_px = np.where((reason == "")[:, None], points_px, np.nan)
             xy_m, _ = homography.apply(ground.image_to_ground, points_px)
             map_factor_m = map_jacobian(ground, points_px) @ root
-            covariance_m2 = own_covariance(ground, points_px, variance_px2)
+            covariance_m2 = own_covariance(ground, points_px, seen_covariance_px2)
             covariance_m2 += map_factor_m @ map_factor_m.transpose(0, 2, 1)
+            covariance_m2 += self._prior_variance_m2(tracks)[:, None, None] * np.eye(2)
         valid = np.isfinite(points_px).all(axis=1)
         velocity_mps = self._velocities.update(time_s, tracks.track_id, xy_m, valid & tracks.observed)
         velocity_mps[~valid] = np.nan
@@ -102,38 +110,68 @@ class Locator:
         }
         return time_s - np.array([*self._observed_s.values()], dtype=np.float64)
 
-    def _anchors(self, tracks: Tracks) -> FloatArray:
+    def _has_point(self, tracks: Tracks) -> BoolArray:
+        """Tell (M,) which tracks are placed by their own ground point."""
+        if self._params.anchor not in _OWN_POINT_FIRST:
+            return np.zeros(len(tracks), dtype=np.bool_)
+        return np.asarray(np.isfinite(tracks.foot_px).all(axis=1))
+
+    def _levels(self, tracks: Tracks, ground: GroundMap) -> FloatArray:
+        """Return (M,) where the anchor lies between the upper edge of each box, 0, and its lower, 1."""
+        if self._params.anchor != "class_prior":
+            return np.full(len(tracks), 0.5 if self._params.anchor == "box_centre" else 1.0)
+        centre_px = ground.undistorted((tracks.xyxy_px[:, :2] + tracks.xyxy_px[:, 2:]) / 2.0)
+        return class_prior.levels(tracks.class_id, class_prior.sines_of_view(ground, centre_px))
+
+    def _prior_variance_m2(self, tracks: Tracks) -> FloatArray:
+        """Return (M,) variance of each coordinate that a box leaves open, where its class says where it stands."""
+        leaves_open = ~self._has_point(tracks) & (self._params.anchor == "class_prior")
+        variance_m2: FloatArray = np.where(leaves_open, class_prior.SIGMA_M[tracks.class_id] ** 2, 0.0)
+        return variance_m2
+
+    def _standing(self, tracks: Tracks, level: FloatArray, coasted_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return (M, 2) the point of each track that stands on the ground, as seen, and its (M, 2, 2) covariance."""
+        own = self._has_point(tracks)
+        longer_px = (tracks.xyxy_px[:, 2:] - tracks.xyxy_px[:, :2]).max(axis=1, initial=0.0)
+        coasting_px2 = (self._params.coast_sigma_per_s * longer_px * coasted_s) ** 2
+        points_px = np.where(own[:, None], tracks.foot_px, self._anchors(tracks, level))
+        anchor_px2 = self._anchor_variance(tracks, level)[:, :, None] * np.eye(2)
+        covariance_px2 = np.where(own[:, None, None], tracks.foot_covariance_px2, anchor_px2)
+        return points_px, covariance_px2 + coasting_px2[:, None, None] * np.eye(2)
+
+    @staticmethod
+    def _anchors(tracks: Tracks, level: FloatArray) -> FloatArray:
         left, top, right, bottom = tracks.xyxy_px.T
-        down = bottom if self._params.anchor == "bottom_centre" else (top + bottom) / 2.0
-        return np.column_stack([(left + right) / 2.0, down])
+        return np.column_stack([(left + right) / 2.0, (1.0 - level) * top + level * bottom])
 
     def _edge_sigma(self, tracks: Tracks) -> FloatArray:
         """Return (M, 2) standard error in pixels of a vertical and of a horizontal edge of each box."""
         sides_px = tracks.xyxy_px[:, 2:] - tracks.xyxy_px[:, :2]
         return np.maximum(self._params.edge_sigma_fraction * sides_px, self._params.edge_sigma_floor_px)
 
-    def _anchor_variance(self, tracks: Tracks, coasted_s: FloatArray) -> FloatArray:
+    def _anchor_variance(self, tracks: Tracks, level: FloatArray) -> FloatArray:
         """Return (M, 2) variance of the anchor: a mean of two independent edges has half that of one."""
-        edges = np.array([2.0, 1.0 if self._params.anchor == "bottom_centre" else 2.0])
-        longer_px = (tracks.xyxy_px[:, 2:] - tracks.xyxy_px[:, :2]).max(axis=1, initial=0.0)
-        coasting = (self._params.coast_sigma_per_s * longer_px * coasted_s) ** 2
-        variance_px2: FloatArray = self._edge_sigma(tracks) ** 2 / edges + coasting[:, None]
+        shares = np.column_stack([np.full(len(level), 0.5), (1.0 - level) ** 2 + level**2])
+        variance_px2: FloatArray = self._edge_sigma(tracks) ** 2 * shares
         return variance_px2
 
-    def _cut_off(self, tracks: Tracks, size_px: tuple[int, int]) -> BoolArray:
+    def _cut_off(self, tracks: Tracks, level: FloatArray, size_px: tuple[int, int]) -> BoolArray:
         """Tell (M,) which boxes may go on outside the picture on a side that their anchor depends on."""
         margin_px = np.maximum(self._edge_sigma(tracks), self._params.cut_off_margin_px)
         # The outermost pixels have their centres on 0 and size - 1, their outer edges half a pixel further.
         touches_low = tracks.xyxy_px[:, :2] < margin_px - 0.5
         touches_high = tracks.xyxy_px[:, 2:] > np.array(size_px) - 0.5 - margin_px
         cut_off: BoolArray = touches_low[:, 0] | touches_high.any(axis=1)
-        return cut_off if self._params.anchor == "bottom_centre" else cut_off | touches_low[:, 1]
+        cut_off |= touches_low[:, 1] & (level < _TOP_COUNTS_BELOW)
+        return cut_off & ~self._has_point(tracks)
 
-    def _reasons(self, tracks: Tracks, ground: GroundMap, points_px: FloatArray, margin: FloatArray) -> TextArray:
+    def _reasons(
+        self, tracks: Tracks, level: FloatArray, ground: GroundMap, points_px: FloatArray, margin: FloatArray
+    ) -> TextArray:
         """Return (M,) why each track cannot be located, the first cause that applies; empty where it can."""
         _, mapped = homography.apply(ground.image_to_ground, points_px)
         causes = (
-            (self._cut_off(tracks, ground.image_size_px), CUT_OFF),
+            (self._cut_off(tracks, level, ground.image_size_px), CUT_OFF),
             (~np.isfinite(points_px).all(axis=1), OUTSIDE_LENS),
             (~mapped, BEYOND_HORIZON),
             (margin < self._params.horizon_sigmas, NEAR_HORIZON),

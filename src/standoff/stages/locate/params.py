@@ -9,7 +9,7 @@ from typing_extensions import Doc
 
 from standoff.core.classes import CLASS_BY_NAME
 
-Anchor = Literal["bottom_centre", "box_centre"]
+Anchor = Literal["ground_point", "class_prior", "bottom_centre", "box_centre"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,10 +19,12 @@ class LocateParams:
     anchor: Annotated[
         Anchor,
         Doc(
-            "The point of the box that is taken to touch the ground. The paper takes the centre of the box, which "
-            "places a tall entity behind where it stands."
+            "The point that is taken to stand on the ground. ground_point: the detector's own, or where it gives none "
+            "the bottom centre of the box. class_prior: its own, or where things of the class usually stand in boxes "
+            "seen at this angle, with the error that a box leaves open. bottom_centre: always that. box_centre: the "
+            "paper's, which places a tall entity behind where it stands."
         ),
-    ] = "bottom_centre"
+    ] = "ground_point"
     edge_sigma_fraction: Annotated[
         float,
         Ge(0),

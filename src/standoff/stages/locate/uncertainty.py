@@ -79,13 +79,13 @@ def map_jacobian(ground: GroundMap, undistorted_px: FloatArray) -> FloatArray:
     return np.concatenate([by_entries, by_k1], axis=2)
 
 
-def own_covariance(ground: GroundMap, undistorted_px: FloatArray, variance_px2: FloatArray) -> FloatArray:
+def own_covariance(ground: GroundMap, undistorted_px: FloatArray, covariance_px2: FloatArray) -> FloatArray:
     """Carry the error of each picture point to the ground, lens and perspective included.
 
     Args:
         ground: The map.
         undistorted_px: (N, 2) the points without lens distortion.
-        variance_px2: (N, 2) variance across and down the picture, as seen in it.
+        covariance_px2: (N, 2, 2) of the points, as seen in the picture.
 
     Returns:
         (N, 2, 2) metres squared, without the map's share; NaN where the point is.
@@ -93,12 +93,12 @@ def own_covariance(ground: GroundMap, undistorted_px: FloatArray, variance_px2: 
     jacobian = homography.point_jacobian(ground.image_to_ground, undistorted_px)
     if ground.camera is not None:
         jacobian = jacobian @ undistortion_jacobian(ground.camera, undistorted_px)
-    covariance: FloatArray = (jacobian * variance_px2[:, None, :]) @ jacobian.transpose(0, 2, 1)
+    covariance: FloatArray = jacobian @ covariance_px2 @ jacobian.transpose(0, 2, 1)
     return covariance
 
 
 def horizon_margin(
-    ground: GroundMap, root: FloatArray, undistorted_px: FloatArray, variance_px2: FloatArray
+    ground: GroundMap, root: FloatArray, undistorted_px: FloatArray, covariance_px2: FloatArray
 ) -> FloatArray:
     """Return by how many of its standard errors each point lies on the camera's side of the horizon.
 
@@ -108,7 +108,7 @@ def horizon_margin(
         ground: The map.
         root: (10, 10) factor of its covariance.
         undistorted_px: (N, 2).
-        variance_px2: (N, 2); the lens's part in it is left out.
+        covariance_px2: (N, 2, 2); the lens's part in it is left out.
 
     Returns:
         (N,); negative beyond the horizon, infinite where nothing is uncertain, NaN where the point is.
@@ -116,7 +116,7 @@ def horizon_margin(
     last_row = ground.image_to_ground[2]
     homogeneous = np.column_stack([undistorted_px, np.ones(len(undistorted_px))])
     denominator = homogeneous @ last_row
-    variance = variance_px2 @ last_row[:2] ** 2 + ((homogeneous @ root[6:9]) ** 2).sum(axis=1)
+    variance = covariance_px2 @ last_row[:2] @ last_row[:2] + ((homogeneous @ root[6:9]) ** 2).sum(axis=1)
     exact = variance == 0.0
     margin: FloatArray = denominator / np.sqrt(np.where(exact, 1.0, variance))
     margin[exact & (denominator > 0)] = np.inf

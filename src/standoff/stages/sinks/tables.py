@@ -15,7 +15,7 @@ import numpy as np
 import pyarrow as pa
 
 from standoff import __version__
-from standoff.clips import COLUMNS, metadata_of
+from standoff.clips import COLUMNS, FOOT_COLUMNS, metadata_of
 from standoff.core.classes import CLASSES
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import FrameResult, GroundMap, IntArray, NoGroundMap, Outcome, TextArray
@@ -40,6 +40,7 @@ _TRACK_COLUMNS = (
     ("y1_px", pa.float64(), "px", "top edge"),
     ("x2_px", pa.float64(), "px", "right edge"),
     ("y2_px", pa.float64(), "px", "bottom edge"),
+    *FOOT_COLUMNS,
     ("observed", pa.bool_(), "", "false: predicted, no detection supports it in this frame"),
     ("age_s", pa.float64(), "s", "since the track was first seen"),
     ("x_m", pa.float64(), "m", "site frame; null where the position is invalid"),
@@ -138,6 +139,7 @@ def _track_rows(result: FrameResult) -> Columns:
         "class": _NAMES[tracks.class_id],
         "score": tracks.score,
         **_box_columns(tracks.xyxy_px),
+        **_foot_columns(tracks.foot_px, tracks.foot_covariance_px2),
         "observed": tracks.observed,
         "age_s": tracks.age_s,
         "x_m": positions.xy_m[:, 0],
@@ -155,6 +157,16 @@ def _track_rows(result: FrameResult) -> Columns:
 
 def _box_columns(xyxy_px: FloatArray) -> dict[str, FloatArray]:
     return {f"{edge}_px": xyxy_px[:, i] for i, edge in enumerate(("x1", "y1", "x2", "y2"))}
+
+
+def _foot_columns(foot_px: FloatArray, covariance_px2: FloatArray) -> dict[str, FloatArray]:
+    return {
+        "foot_x_px": foot_px[:, 0],
+        "foot_y_px": foot_px[:, 1],
+        "foot_sigma_x_px": np.sqrt(covariance_px2[:, 0, 0]),
+        "foot_sigma_y_px": np.sqrt(covariance_px2[:, 1, 1]),
+        "foot_cov_px2": covariance_px2[:, 0, 1],
+    }
 
 
 def _classes_of(track_id: IntArray, result: FrameResult) -> TextArray:
@@ -211,10 +223,15 @@ def _detection_rows(result: FrameResult) -> Columns:
     if len(found) == 0:
         nothing: TextArray = np.array([None], dtype=object)
         names = ("score", "class", "class_id")
-        return {**columns, **_box_columns(np.full((1, 4), np.nan)), **dict.fromkeys(names, nothing)}
+        unknown = {
+            **_box_columns(np.full((1, 4), np.nan)),
+            **_foot_columns(np.full((1, 2), np.nan), np.full((1, 2, 2), np.nan)),
+        }
+        return {**columns, **unknown, **dict.fromkeys(names, nothing)}
     return {
         **columns,
         **_box_columns(found.xyxy_px),
+        **_foot_columns(found.foot_px, found.foot_covariance_px2),
         "score": found.score,
         "class": _NAMES[found.class_id],
         "class_id": found.class_id,

@@ -86,6 +86,11 @@ class TrackParams:
         Gt(0),
         Doc("How much width and height wander in a second, in box sizes."),
     ] = 0.05
+    foot_memory_s: Annotated[
+        float,
+        Gt(0),
+        Doc("A ground point is a mean of those of the last moments: after so many seconds one weighs a third."),
+    ] = 0.4
     start_speed: Annotated[
         float,
         Gt(0),

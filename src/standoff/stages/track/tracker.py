@@ -11,6 +11,7 @@ from standoff.core.classes import CLASSES, Role
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.picture_step import picture_step
 from standoff.core.types import CameraMotion, Detections, IntArray, NoCameraMotion, Tracks
+from standoff.stages.track import foot
 from standoff.stages.track import motion as box_motion
 from standoff.stages.track.association import assign, widen
 from standoff.stages.track.carry import carry
@@ -19,6 +20,7 @@ from standoff.stages.track.params import TrackParams
 _ROW = np.dtype(
     [
         *box_motion.MOTION_FIELDS,
+        *foot.FOOT_FIELDS,
         ("track_id", np.int64),
         ("score", np.float64),
         ("class_votes", np.float64, (len(CLASSES),)),
@@ -53,6 +55,8 @@ class Tracker:
 
     Where the motion of the camera is known, boxes are predicted over the ground and carried along with its picture, so
     that a turning drone loses nobody; where it is not, the picture is taken to stand still.
+
+    A ground point that the detector gives is smoothed inside the box and goes along with it.
 
     Times are presentation timestamps in seconds; the steps between them may vary, and may be zero.
 
@@ -135,6 +139,7 @@ class Tracker:
             )
         if len(self._rows):
             box_motion.predict(self._rows, time_s - self._time_s, self._params)
+            foot.forget(self._rows, time_s - self._time_s, self._params.foot_memory_s)
             step = picture_step(self._motion, self._time_s, motion)
             if step is not None and isinstance(motion, CameraMotion):
                 carry(self._rows, step, motion.camera)
@@ -191,6 +196,7 @@ class Tracker:
         """Take detections `by` (K,) into tracks `which` (K,)."""
         rows, score = self._rows, detections.score[by]
         box_motion.correct(rows, which, box_motion.to_centre(detections.xyxy_px[by]), self._params)
+        foot.correct(rows, which, detections.foot_px[by], detections.foot_covariance_px2[by])
         rows["score"][which] = score
         rows["class_votes"][which, detections.class_id[by]] += score
         rows["hits"][which] += 1
@@ -211,6 +217,8 @@ class Tracker:
             return
         rows = np.zeros(count, _ROW)
         box_motion.start(rows, box_motion.to_centre(detections.xyxy_px), self._params)
+        foot.start(rows)
+        foot.correct(rows, np.arange(count), detections.foot_px, detections.foot_covariance_px2)
         rows["track_id"] = np.arange(self._next_id, self._next_id + count)
         rows["score"] = detections.score
         rows["class_votes"][np.arange(count), detections.class_id] = detections.score
@@ -228,6 +236,7 @@ class Tracker:
     def _report(self, *, rested: bool = False) -> Tracks:
         overdue_s = self._looked_s - self._rows["seen_s"]
         rows = self._rows[self._rows["confirmed"] & (overdue_s <= self._params.max_coast_s + _TIME_ROUNDING_S)]
+        foot_px, foot_covariance_px2 = foot.in_picture(rows)
         return Tracks(
             track_id=rows["track_id"],
             xyxy_px=box_motion.to_edges(rows["box"]),
@@ -235,4 +244,6 @@ class Tracker:
             class_id=self._class_id(rows),
             observed=(rows["seen_s"] == self._time_s) & (not rested),
             age_s=self._time_s - rows["started_s"],
+            foot_px=foot_px,
+            foot_covariance_px2=foot_covariance_px2,
         )

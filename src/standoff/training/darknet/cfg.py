@@ -15,6 +15,7 @@ from typing import Final, Literal, TypeAlias, cast, get_args
 from standoff.core.errors import ModelError
 
 Activation = Literal["linear", "leaky", "logistic", "relu", "relu6"]
+POINT_VALUES: Final = 4  # x and y, and the logarithms of their standard errors
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,12 +95,19 @@ class Yolo:
         anchors_px: (width, height) of this head's own anchors, in network input pixels.
         classes: Number of classes.
         scale_xy: Stretches the box centre's sigmoid about its middle (`scale_x_y`).
+        has_point: Each anchor also gives a ground point and its error (`ground_point`; Darknet itself has none).
     """
 
     line: int
     anchors_px: tuple[tuple[float, float], ...]
     classes: int
     scale_xy: float
+    has_point: bool = False
+
+    @property
+    def values(self) -> int:
+        """Numbers an anchor and cell: box and objectness, classes, then the point if there is one."""
+        return 5 + self.classes + (POINT_VALUES if self.has_point else 0)
 
 
 Layer: TypeAlias = Convolutional | Shortcut | Route | Upsample | Maxpool | Dropout | Yolo
@@ -318,6 +326,7 @@ def _yolo(section: _Section, _index: int) -> Yolo:
         anchors_px=tuple((sides[2 * anchor], sides[2 * anchor + 1]) for anchor in mask),
         classes=section.integer("classes", 20),
         scale_xy=section.number("scale_x_y", 1.0),
+        has_point=bool(section.integer("ground_point", 0, at_least=0)),
     )
 
 
@@ -362,11 +371,10 @@ def parse_cfg(text: str, name: str = "cfg") -> DarknetCfg:
     cfg = DarknetCfg(
         name, net.integer("width", 416), net.integer("height", 416), net.integer("channels", 3), tuple(layers)
     )
-    if len({head.classes for head in cfg.heads}) != 1:
-        counts = ", ".join(str(head.classes) for head in cfg.heads) or "no [yolo] layer"
-        raise ModelError(
-            expected=f"[yolo] layers with one number of classes in {name}", found=counts, fix="correct the cfg file"
-        )
+    if len({head.values for head in cfg.heads}) != 1:
+        counts = ", ".join(f"{head.classes}{' with point' * head.has_point}" for head in cfg.heads) or "no [yolo] layer"
+        expected = f"[yolo] layers with one number of classes, all with a ground point or none, in {name}"
+        raise ModelError(expected=expected, found=counts, fix="correct the cfg file")
     return cfg
 
 

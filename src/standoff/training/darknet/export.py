@@ -11,7 +11,7 @@ from pathlib import Path
 
 from standoff.core.classes import names_by_line
 from standoff.core.errors import ModelError
-from standoff.stages.detect.model_card import INPUT_NAME, OUTPUT_NAME, ModelCard, file_sha256
+from standoff.stages.detect.model_card import INPUT_NAME, OUTPUT_NAME, POINTS_NAME, ModelCard, file_sha256
 from standoff.stages.sinks.whole import whole_file
 from standoff.training.darknet.cfg import DarknetCfg, read_cfg, read_text
 from standoff.training.darknet.shapes import check_input
@@ -88,24 +88,25 @@ def _write_onnx(cfg: DarknetCfg, weights: Path, card: ModelCard, path: Path) -> 
     import onnx
     import torch
 
-    from standoff.training.darknet.network import DarknetNetwork, DecodedNetwork
+    from standoff.training.darknet.network import DarknetNetwork, DecodedNetwork, DecodedPoints
     from standoff.training.darknet.weights import load_weights
 
     network = DarknetNetwork(cfg)
     load_weights(network, weights)
     decoded = DecodedNetwork(network).eval()
+    has_point = cfg.heads[0].has_point
     picture = torch.zeros(1, cfg.channels, cfg.height_px, cfg.width_px)
     with torch.no_grad(), warnings.catch_warnings():
         # The TorchScript exporter is chosen on purpose: the other one needs onnxscript.
         warnings.filterwarnings("ignore", category=DeprecationWarning)
         torch.onnx.export(
-            decoded,
+            DecodedPoints(decoded).eval() if has_point else decoded,
             (picture,),
             str(path),
             dynamo=False,
             opset_version=_OPSET,
             input_names=[INPUT_NAME],
-            output_names=[OUTPUT_NAME],
+            output_names=[OUTPUT_NAME, POINTS_NAME] if has_point else [OUTPUT_NAME],
         )
     model = onnx.load(str(path))
     onnx.helper.set_model_props(model, card.to_metadata())

@@ -9,6 +9,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from standoff.training.darknet.cfg import (
+    POINT_VALUES,
     Activation,
     Convolutional,
     DarknetCfg,
@@ -25,6 +26,8 @@ from standoff.training.darknet.shapes import Shape, layer_shapes
 _LEAKY_SLOPE = 0.1
 _BATCH_NORM_EPSILON = 1e-6
 _WIDE = 5
+LOG_SIGMA = (-5.0, 3.0)
+"""Errors of a point that can be told: from 1/150 of an anchor's side, a tenth of a pixel, to 20 of them."""
 
 
 def _activation(name: Activation) -> nn.Module:
@@ -149,7 +152,7 @@ class DarknetNetwork(nn.Module):
             pictures: (B, channels, H, W), 0 to 1.
 
         Returns:
-            The raw map of each head, (B, anchors * (5 + classes), h, w): what the last convolution says.
+            The raw map of each head, (B, anchors * values, h, w): what the last convolution says.
         """
         kept: dict[int, Tensor] = {}
         heads: list[Tensor] = []
@@ -195,15 +198,37 @@ class DecodedNetwork(nn.Module):
             pictures: (B, channels, H, W), 0 to 1, of the cfg's size.
 
         Returns:
+            The boxes of `decode`.
+        """
+        return self.decode(self.network(pictures))[0]
+
+    def decode(self, heads: tuple[Tensor, ...]) -> tuple[Tensor, Tensor]:
+        """Turn raw heads into boxes and points.
+
+        Returns:
             (B, N, 5 + classes): box centre x, y, width, height in input pixels (0 is the left or top
             edge of the first pixel), objectness, and the probability of each class given an object.
-            Rows run over heads, then cell rows, cell columns and anchors.
+            Rows run over heads, then cell rows, cell columns and anchors. And (B, N, 4): the ground point of each box,
+            x and y, and the standard errors of both, in input pixels; (B, N, 0) where the heads have none.
         """
-        return self.decode(self.network(pictures))
+        decoded = [decode(head) for decode, head in zip(self.decoders, heads, strict=True)]
+        return torch.cat([boxes for boxes, _ in decoded], dim=1), torch.cat([points for _, points in decoded], dim=1)
 
-    def decode(self, heads: tuple[Tensor, ...]) -> Tensor:
-        """Turn raw heads into what `forward` returns."""
-        return torch.cat([decode(head) for decode, head in zip(self.decoders, heads, strict=True)], dim=1)
+
+class DecodedPoints(nn.Module):
+    """A network whose outputs are boxes and ground points, as they are exported.
+
+    Args:
+        decoded: The network; its heads have points.
+    """
+
+    def __init__(self, decoded: DecodedNetwork) -> None:
+        super().__init__()
+        self.decoded = decoded
+
+    def forward(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
+        """Return what `DecodedNetwork.decode` does."""
+        return self.decoded.decode(self.decoded.network(pictures))
 
 
 class _HeadDecoder(nn.Module):
@@ -228,11 +253,35 @@ class _HeadDecoder(nn.Module):
         self.register_buffer("cell_px", torch.tensor([stride_x_px, stride_y_px]))
         self.register_buffer("anchors_px", torch.tensor(head.anchors_px))
 
-    def forward(self, raw: Tensor) -> Tensor:
-        anchors, values = len(self.head.anchors_px), 5 + self.head.classes
+    def forward(self, raw: Tensor) -> tuple[Tensor, Tensor]:
+        anchors, values, boxes = len(self.head.anchors_px), self.head.values, 5 + self.head.classes
         height, width = self.shape.height, self.shape.width
         raw = raw.reshape(-1, anchors, values, height, width).permute(0, 3, 4, 1, 2)
         centre_px = (torch.sigmoid(raw[..., 0:2]) * self.head.scale_xy + self.cell) * self.cell_px
         size_px = torch.exp(raw[..., 2:4]) * self.anchors_px
-        decoded = torch.cat([centre_px, size_px, torch.sigmoid(raw[..., 4:])], dim=-1)
-        return decoded.reshape(-1, height * width * anchors, values)
+        decoded = torch.cat([centre_px, size_px, torch.sigmoid(raw[..., 4:boxes])], dim=-1)
+        decoded = decoded.reshape(-1, height * width * anchors, boxes)
+        if not self.head.has_point:
+            return decoded, decoded[..., :0]
+        middle_px = (self.cell + self.head.scale_xy / 2.0) * self.cell_px
+        foot_px, log_sigma = points_of(raw[..., boxes:], middle_px, self.anchors_px)
+        points = torch.cat([foot_px, log_sigma.exp()], dim=-1)
+        return decoded, points.reshape(-1, height * width * anchors, POINT_VALUES)
+
+
+def points_of(raw: Tensor, middle_px: Tensor, anchors_px: Tensor) -> tuple[Tensor, Tensor]:
+    """Decode ground points.
+
+    A point is told from the middle of the cell that the box belongs to, in sides of the anchor: so its error does not
+    lean on the error of the box.
+
+    Args:
+        raw: (..., 4) what the last convolution says.
+        middle_px: (..., 2) middle of the cells.
+        anchors_px: (..., 2) width and height.
+
+    Returns:
+        (..., 2) points, and (..., 2) logarithms of their standard errors; input pixels.
+    """
+    log_sigma = raw[..., 2:4].clamp(*LOG_SIGMA) + anchors_px.log()
+    return middle_px + raw[..., 0:2] * anchors_px, log_sigma

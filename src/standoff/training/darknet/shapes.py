@@ -50,9 +50,9 @@ def _convolved(cfg: DarknetCfg, index: int, layer: Convolutional, before: Shape)
 
 
 def _checked_head(cfg: DarknetCfg, index: int, head: Yolo, before: Shape) -> Shape:
-    channels = len(head.anchors_px) * (5 + head.classes)
+    channels = len(head.anchors_px) * head.values
     if before.channels != channels:
-        expected = f"{channels} filters before it ({len(head.anchors_px)} anchors of 5 + {head.classes})"
+        expected = f"{channels} filters before it ({len(head.anchors_px)} anchors of {head.values})"
         raise _misfit(cfg, index, expected, f"{before.channels}")
     return before
 

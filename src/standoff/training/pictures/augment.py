@@ -39,12 +39,15 @@ class Sample:
         xyxy_px: (N, 4) in input pixels; 0 is the left edge of the first pixel; inside the input.
         class_id: (N,)
         ignored: (N,) as in `LabelledPicture`.
+        foot_px: (N, 2) ground points, counted as the boxes are; they may lie outside the input, and are NaN where none
+            is marked.
     """
 
     image: ImageArray
     xyxy_px: FloatArray
     class_id: IntArray
     ignored: BoolArray
+    foot_px: FloatArray
 
 
 def make_sample(
@@ -72,13 +75,15 @@ def make_sample(
     parts = []
     for left, top, right, bottom in _cells(rng, size_px, params):
         part = _show(rng, data, pick, load, image[top:bottom, left:right], params)
-        parts.append(replace(part, xyxy_px=part.xyxy_px + np.array([left, top, left, top])))
+        shift = np.array([left, top])
+        parts.append(replace(part, xyxy_px=part.xyxy_px + np.tile(shift, 2), foot_px=part.foot_px + shift))
     ignored = np.concatenate([part.ignored for part in parts])
     xyxy_px = np.concatenate([part.xyxy_px for part in parts])
     if rng.random() < params.cut_out:
         ignored |= hide_parts(rng, image, xyxy_px, params)
     class_id = np.concatenate([part.class_id for part in parts])
-    return Sample(degrade(rng, image, params), xyxy_px, class_id, ignored)
+    foot_px = np.concatenate([part.foot_px for part in parts])
+    return Sample(degrade(rng, image, params), xyxy_px, class_id, ignored, foot_px)
 
 
 def _cells(
@@ -115,7 +120,8 @@ def _show(
             continue
         view.warp(image, onto)
         xyxy_px, present, ignored = cut_boxes(view.carry(picture.xyxy_px), picture.ignored, size_px, params)
-        return Sample(onto, xyxy_px[present], picture.class_id[present], ignored[present])
+        foot_px = view.carry_points(picture.foot_px)[present]
+        return Sample(onto, xyxy_px[present], picture.class_id[present], ignored[present], foot_px)
     raise DataError(
         expected="pictures that can be read",
         found=f"{_MOST_FAILURES} in a row that cannot, the last {picture.path}",

@@ -28,6 +28,7 @@ class Batch:
         boxes: (M, 4) float32 left, top, right, bottom in input pixels; 0 is the left edge of the first pixel.
         class_id: (M,) int64.
         ignored: (M,) bool, as in `LabelledPicture`.
+        feet: (M, 2) float32 ground points, counted as the boxes are; NaN where none is marked.
         picture: (M,) int64 position in the batch of the picture that the box is in, ascending.
         step: Which batch it is.
         problems: Pictures that could not be read and were replaced.
@@ -37,13 +38,14 @@ class Batch:
     boxes: torch.Tensor
     class_id: torch.Tensor
     ignored: torch.Tensor
+    feet: torch.Tensor
     picture: torch.Tensor
     step: int = 0
     problems: tuple[Problem, ...] = ()
 
     def to(self, device: torch.device) -> Batch:
         """Return the batch on a device."""
-        names = ("pictures", "boxes", "class_id", "ignored", "picture")
+        names = ("pictures", "boxes", "class_id", "ignored", "feet", "picture")
         return replace(self, **{name: getattr(self, name).to(device) for name in names})
 
 
@@ -80,6 +82,7 @@ def stack_samples(samples: Sequence[Sample]) -> Batch:
         boxes=torch.from_numpy(np.concatenate([sample.xyxy_px for sample in samples]).astype(np.float32)),
         class_id=torch.from_numpy(np.concatenate([sample.class_id for sample in samples]).astype(np.int64)),
         ignored=torch.from_numpy(np.concatenate([sample.ignored for sample in samples]).astype(np.bool_)),
+        feet=torch.from_numpy(np.concatenate([sample.foot_px for sample in samples]).astype(np.float32)),
         picture=torch.repeat_interleave(torch.arange(len(samples)), torch.tensor(counts)),
     )
 

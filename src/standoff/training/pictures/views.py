@@ -73,6 +73,14 @@ class View:
         half = np.sqrt(((edges_px[:, 2:] - edges_px[:, :2]) / 2.0) ** 2 @ (linear**2).T)
         return np.concatenate([centre - half, centre + half], axis=1)
 
+    def carry_points(self, points_px: FloatArray) -> FloatArray:
+        """Return (N, 2) points of the picture, 0 the centre of its first pixel, in the view, 0 the edge of its first.
+
+        What becomes of a box's foot is known even where the view cuts the box off: the point is not cut.
+        """
+        carried: FloatArray = (points_px + 0.5) @ self.source_to_view[:, :2].T + self.source_to_view[:, 2]
+        return carried
+
 
 def cut_boxes(
     carried_px: FloatArray, ignored: BoolArray, size_px: tuple[int, int], params: AugmentParams

@@ -16,7 +16,13 @@ from standoff.evaluation.detection.style import GRID, INK, SERIES_COLOURS
 from standoff.labels import LabelledPicture, load_picture
 from standoff.stages.detect.letterbox import resize
 
-_LOSSES: Final = {"loss_total": "total", "loss_objectness": "objectness", "loss_box": "box", "loss_classes": "classes"}
+_LOSSES: Final = {
+    "loss_total": "total",
+    "loss_objectness": "objectness",
+    "loss_box": "box",
+    "loss_classes": "classes",
+    "loss_points": "points",
+}
 _CELL_WIDTH_PX, _COLUMNS = 800, 2
 _SURE = 0.3
 """Boxes drawn: less sure ones would hide the picture."""

@@ -36,7 +36,7 @@ from standoff.training.run.validation import validate
 _STEPS_OF_ONE_SCALE = 10
 _SEEDS_BETWEEN = 1_000_003
 """Of two processes of a crew: each draws its own pictures."""
-_TERMS = ("total", "box", "objectness", "classes")
+_TERMS = ("total", "box", "objectness", "classes", "points")
 
 
 @dataclass(slots=True)
@@ -84,15 +84,25 @@ class Trainer:
         params: Settings.
         checkpoints: Folder of checkpoints.
         backbone_layers: Layers that count as backbone.
+        folded: No layer's batch normalisation has statistics of its own: they stay as they are.
     """
 
     def __init__(
-        self, network: DarknetNetwork, data: LabelledData, params: TrainParams, checkpoints: Path, backbone_layers: int
+        self,
+        network: DarknetNetwork,
+        data: LabelledData,
+        params: TrainParams,
+        checkpoints: Path,
+        backbone_layers: int,
+        *,
+        folded: bool = False,
     ) -> None:
         self._crew = Crew.join()
         self._stride = largest_stride(network.cfg)
         self._data, self._params, self._checkpoints = data, params, checkpoints
         self._backbone_layers = backbone_layers
+        own_norm = len(network.blocks) if folded else 0
+        self._frozen_norm = max(own_norm, backbone_layers if params.frozen_norm else 0)
         self._network = _on(self._crew.device, network)
         self._optimizer = make_optimizer(self._network, backbone_layers, params)
         self._average = AveragedWeights(self._network, params.ema)
@@ -154,7 +164,7 @@ class Trainer:
         params = self._params
         is_frozen = step < params.freeze_steps
         frozen = max(params.frozen_layers, self._backbone_layers if is_frozen else 0)
-        set_trainable(self._network, frozen, self._backbone_layers, frozen_norm=params.frozen_norm)
+        set_trainable(self._network, frozen, self._frozen_norm)
         set_learning_rate(self._optimizer, learning_rate(step, params))
         self._optimizer.zero_grad(set_to_none=True)
         sums = np.zeros(len(_TERMS))

@@ -3,7 +3,8 @@
 Source:
     Redmon and Farhadi, YOLOv3: An Incremental Improvement, 2018, section 2.1 (one anchor a truth, logistic objectness
     and classes, predictions that overlap a truth are not negatives); the complete IoU of Zheng et al., Distance-IoU
-    Loss, 2020, eq. 10 and 11; several anchors a truth as in Bochkovskiy et al., YOLOv4, 2020, section 3.4.
+    Loss, 2020, eq. 10 and 11; several anchors a truth as in Bochkovskiy et al., YOLOv4, 2020, section 3.4. The ground
+    point with its error: see `standoff.training.run.point_loss`.
 """
 
 from __future__ import annotations
@@ -18,8 +19,10 @@ from torch import Tensor
 from torch.nn import functional
 from typing_extensions import Doc
 
-from standoff.training.darknet.cfg import Yolo
+from standoff.training.darknet.cfg import POINT_VALUES, Yolo
+from standoff.training.darknet.network import points_of
 from standoff.training.pictures.batches import Batch
+from standoff.training.run.point_loss import point_loss
 
 BoxLoss = Literal["ciou", "squared"]
 _LARGEST_LOG_SCALE = 6.0
@@ -34,6 +37,7 @@ class LossParams:
     box_weight: Annotated[float, Gt(0), Doc("Of the box term.")] = 2.0
     objectness_weight: Annotated[float, Gt(0), Doc("Of the objectness term.")] = 1.0
     class_weight: Annotated[float, Gt(0), Doc("Of the class term.")] = 1.0
+    point_weight: Annotated[float, Gt(0), Doc("Of the term of ground points, where the heads have them.")] = 1.0
     ignore_iou: Annotated[
         float,
         Interval(gt=0, le=1),
@@ -55,17 +59,19 @@ class LossTerms:
         box: Its box term, without gradient.
         objectness: Its objectness term, likewise.
         classes: Its class term, likewise.
+        points: Its term of ground points, likewise; 0 where the heads have none.
     """
 
     total: Tensor
     box: Tensor
     objectness: Tensor
     classes: Tensor
+    points: Tensor
 
 
 @dataclass(frozen=True, slots=True)
 class _Targets:
-    """Which predictions of one head learn which truth; (P,) each, boxes (P, 4) xyxy input px."""
+    """Which predictions of one head learn which truth; (P,) each, boxes (P, 4) xyxy, feet (P, 2) input px."""
 
     picture: Tensor
     anchor: Tensor
@@ -73,13 +79,14 @@ class _Targets:
     column: Tensor
     boxes: Tensor
     class_id: Tensor
+    feet: Tensor
 
 
 def yolo_loss(heads: tuple[Tensor, ...], layers: tuple[Yolo, ...], batch: Batch, params: LossParams) -> LossTerms:
     """Compare raw heads with the truth.
 
     Args:
-        heads: Of each head (B, anchors * (5 + classes), h, w).
+        heads: Of each head (B, anchors * values, h, w).
         layers: The heads' sections of the cfg, in the same order.
         batch: Its truth; boxes in input pixels.
         params: Weights and thresholds.
@@ -89,7 +96,7 @@ def yolo_loss(heads: tuple[Tensor, ...], layers: tuple[Yolo, ...], batch: Batch,
     sizes_px = (batch.boxes[:, 2:] - batch.boxes[:, :2])[known]
     learns = _learning_anchors(sizes_px, layers, params.anchor_iou)
     zero = heads[0].new_zeros((), dtype=torch.float32)
-    box, objectness, classes = zero, zero, zero
+    box, objectness, classes, points = zero, zero, zero, zero
     start = 0
     for raw, layer in zip(heads, layers, strict=True):
         count = len(layer.anchors_px)
@@ -104,13 +111,17 @@ def yolo_loss(heads: tuple[Tensor, ...], layers: tuple[Yolo, ...], batch: Batch,
         if len(targets.picture):
             box = box + _box_term(grid, targets, params.box, (width_px, height_px))
             classes = classes + _class_term(grid, targets)
+            if layer.has_point:
+                points = points + _point_term(grid, targets)
     pictures = len(batch.pictures)
-    box, objectness, classes = (
+    box, objectness, classes, points = (
         params.box_weight * box / pictures,
         params.objectness_weight * objectness / pictures,
         params.class_weight * classes / pictures,
+        params.point_weight * points / pictures,
     )
-    return LossTerms(box + objectness + classes, box.detach(), objectness.detach(), classes.detach())
+    total = box + objectness + classes + points
+    return LossTerms(total, box.detach(), objectness.detach(), classes.detach(), points.detach())
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,7 +129,7 @@ class _Grid:
     """One head's raw output in float32, and its boxes.
 
     Attributes:
-        values: (B, A, h, w, 5 + classes) raw.
+        values: (B, A, h, w, values) raw.
         boxes: (B, A, h, w, 4) decoded, xyxy input px.
         layer: Its section of the cfg.
         cell_px: (2,) width and height of a cell.
@@ -138,7 +149,7 @@ class _Grid:
     @classmethod
     def of(cls, raw: Tensor, layer: Yolo, width_px: int, height_px: int) -> _Grid:
         pictures, _, height, width = raw.shape
-        values = raw.float().reshape(pictures, len(layer.anchors_px), 5 + layer.classes, height, width)
+        values = raw.float().reshape(pictures, len(layer.anchors_px), layer.values, height, width)
         values = values.permute(0, 1, 3, 4, 2)
         anchors_px = raw.new_tensor(layer.anchors_px, dtype=torch.float32)
         cell_px = raw.new_tensor([width_px / width, height_px / height], dtype=torch.float32)
@@ -174,6 +185,7 @@ def _assign(batch: Batch, known: Tensor, learns: Tensor, grid: _Grid) -> _Target
         column=cell[:, 0].clamp(0, width - 1),
         boxes=boxes,
         class_id=batch.class_id[known][truth],
+        feet=batch.feet[known][truth],
     )
 
 
@@ -217,9 +229,18 @@ def _box_term(grid: _Grid, targets: _Targets, kind: BoxLoss, size_px: tuple[int,
 
 
 def _class_term(grid: _Grid, targets: _Targets) -> Tensor:
-    said = grid.values[targets.picture, targets.anchor, targets.row, targets.column, 5:]
+    classes = slice(5, 5 + grid.layer.classes)
+    said = grid.values[targets.picture, targets.anchor, targets.row, targets.column, classes]
     wanted = functional.one_hot(targets.class_id, said.shape[1]).to(said.dtype)
     return functional.binary_cross_entropy_with_logits(said, wanted, reduction="sum")
+
+
+def _point_term(grid: _Grid, targets: _Targets) -> Tensor:
+    at = targets.picture, targets.anchor, targets.row, targets.column
+    cell = torch.stack([targets.column, targets.row], dim=1).float()
+    anchors_px = grid.anchors_px[targets.anchor]
+    foot_px, log_sigma = points_of(grid.values[at][:, -POINT_VALUES:], (cell + 0.5) * grid.cell_px, anchors_px)
+    return point_loss((foot_px - targets.feet) / anchors_px, log_sigma - anchors_px.log())
 
 
 def _pairwise_iou(first: Tensor, second: Tensor) -> Tensor:

@@ -57,19 +57,18 @@ def _layer_parameters(network: DarknetNetwork) -> Iterator[tuple[int, nn.Paramet
             yield index, parameter
 
 
-def set_trainable(network: DarknetNetwork, frozen: int, backbone_layers: int, *, frozen_norm: bool) -> None:
+def set_trainable(network: DarknetNetwork, frozen: int, frozen_norm: int) -> None:
     """Put a network into training, less what is frozen.
 
     Args:
         network: Changed in place.
         frozen: So many layers from the first neither move nor update their statistics.
-        backbone_layers: Layers whose statistics stay where `frozen_norm`.
-        frozen_norm: See `TrainParams`.
+        frozen_norm: So many layers from the first do not update their statistics.
     """
     network.train()
     for index, parameter in _layer_parameters(network):
         parameter.requires_grad_(index >= frozen)
-    for block in network.blocks[: max(frozen, backbone_layers if frozen_norm else 0)]:
+    for block in network.blocks[: max(frozen, frozen_norm)]:
         block.eval()
 
 

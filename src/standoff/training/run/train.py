@@ -97,11 +97,9 @@ def train_detector(plan: RunPlan, out: Path, listener: Listener, *, resumes: boo
         _report_problems(data, plan.params, listener)
     _require_usable(data, plan.params)
     folder = RunFolder(out, data.classes)
-    if resumes:
-        network, backbone_layers = _resumed(folder, plan)
-    else:
-        network, backbone_layers = _started(plan, data, folder, listener, leads=leads)
-    trainer = Trainer(network, data, plan.params, folder.checkpoints, plan.params.backbone_layers or backbone_layers)
+    start = _resumed(folder, plan) if resumes else _started(plan, data, folder, listener, leads=leads)
+    backbone_layers = plan.params.backbone_layers or start.backbone_layers
+    trainer = Trainer(start.network, data, plan.params, folder.checkpoints, backbone_layers, folded=start.folded)
     if resumes:
         for name in trainer.resume():
             listener.on_message(f"{name} is damaged and was passed over: going on from step {trainer.progress.step}")
@@ -123,6 +121,21 @@ def train_detector(plan: RunPlan, out: Path, listener: Listener, *, resumes: boo
     if leads:
         _write_results(plan, data, folder, progress, listener)
     return progress
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Start:
+    """What a run begins or goes on with.
+
+    Attributes:
+        network: Filled, unless its checkpoint does it.
+        backbone_layers: That the weights filled without a gap.
+        folded: Its batch normalisations came without statistics.
+    """
+
+    network: DarknetNetwork
+    backbone_layers: int
+    folded: bool
 
 
 class _Unreadable:
@@ -173,12 +186,10 @@ def _write_results(
         listener.on_message(f"no model-half.onnx: {refusal}")
 
 
-def _started(
-    plan: RunPlan, data: LabelledData, folder: RunFolder, listener: Listener, *, leads: bool
-) -> tuple[DarknetNetwork, int]:
+def _started(plan: RunPlan, data: LabelledData, folder: RunFolder, listener: Listener, *, leads: bool) -> _Start:
     if leads:
         _report_near_duplicates(data, listener)
-    cfg_text = compose_cfg(plan.arch, data, plan.params)
+    cfg_text = compose_cfg(plan.arch, data, plan.params, plan.weights)
     cfg = parse_cfg(cfg_text, "network.cfg")
     check_input(cfg)
     network, transferred = fill_network(cfg, data.classes, plan.weights, plan.params.seed)
@@ -195,10 +206,10 @@ def _started(
             f"{plan.arch}: {layers[0]} convolutions from {transferred.source}, {layers[1]} fitted, {layers[2]} fresh"
         )
         folder.write_start(cfg_text, network, plan.to_dict(), facts)
-    return network, backbone_of(network, transferred)
+    return _Start(network, backbone_of(network, transferred), transferred.folded)
 
 
-def _resumed(folder: RunFolder, plan: RunPlan) -> tuple[DarknetNetwork, int]:
+def _resumed(folder: RunFolder, plan: RunPlan) -> _Start:
     cfg = read_cfg(folder.cfg)
     facts = folder.read_start()
     classes = folder.read_classes()
@@ -216,7 +227,7 @@ def _resumed(folder: RunFolder, plan: RunPlan) -> tuple[DarknetNetwork, int]:
                 found=f"{now[name]}",
                 fix=f"leave it as it was (only {', '.join(sorted(_MAY_CHANGE))} may change), or start a new run",
             )
-    return DarknetNetwork(cfg), int(facts["backbone_layers"])
+    return _Start(DarknetNetwork(cfg), int(facts["backbone_layers"]), bool(facts["transferred"].get("folded")))
 
 
 def _flat(settings: dict[str, Any], before: str = "") -> dict[str, Any]:

@@ -13,6 +13,7 @@ from standoff.core.types import Detections
 from standoff.evaluation.detection import DetectionScore, score_detections
 from standoff.labels import LabelledPicture, load_picture
 from standoff.stages.detect import DetectParams
+from standoff.stages.detect.feet import feet_of
 from standoff.stages.detect.letterbox import Letterbox, resize
 from standoff.stages.detect.outputs import read_rows as read_candidates
 from standoff.stages.detect.suppression import suppress
@@ -52,21 +53,32 @@ def detect_pictures(
                 pixels = torch.from_numpy(blob).to(device).contiguous(memory_format=torch.channels_last)
                 heads = network(pixels)
             # bfloat16 has 8 bits: a box at 640 px would be rounded to 4.
-            rows = decoded.decode(tuple(head.float() for head in heads))[0].cpu().numpy()
+            boxes, points = decoded.decode(tuple(head.float() for head in heads))
         readable.append(picture)
-        found.append(read_rows(rows, letterbox))
+        found.append(read_rows(boxes[0].cpu().numpy(), points[0].cpu().numpy(), letterbox))
     return readable, found
 
 
-def read_rows(rows: npt.NDArray[np.float32], letterbox: Letterbox) -> Detections:
-    """Turn (N, 5 + classes) rows of a decoded network into boxes of the picture, without duplicates."""
-    rows = rows[np.argsort(-rows[:, 4], kind="stable")[:_MOST_ROWS]]
-    candidates = read_candidates([rows[None]], _LEAST_SCORE)
+def read_rows(rows: npt.NDArray[np.float32], points: npt.NDArray[np.float32], letterbox: Letterbox) -> Detections:
+    """Turn what a network says into boxes and ground points of the picture, without duplicates.
+
+    Args:
+        rows: (N, 5 + classes) of a decoded network.
+        points: (N, 4) of them, or (N, 0).
+        letterbox: Where the picture lies in the network's input.
+    """
+    surest = np.argsort(-rows[:, 4], kind="stable")[:_MOST_ROWS]
+    outputs = [rows[None, surest], *([points[None, surest]] if points.size else [])]
+    candidates = read_candidates(outputs, _LEAST_SCORE)
     xyxy_px = letterbox.to_source(candidates.xyxy_px)
     class_id = candidates.probability.argmax(axis=1)
     score = candidates.probability.max(axis=1).astype(np.float64)
     wanted = (score >= _LEAST_SCORE) & (xyxy_px[:, 2:] > xyxy_px[:, :2]).all(axis=1)
-    return suppress(Detections(xyxy_px, score, class_id)[wanted], _PARAMS.nms_iou, _PARAMS.max_detections)
+    return suppress(
+        Detections(xyxy_px, score, class_id, *feet_of(candidates, letterbox))[wanted],
+        _PARAMS.nms_iou,
+        _PARAMS.max_detections,
+    )
 
 
 def validate(

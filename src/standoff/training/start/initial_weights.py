@@ -16,10 +16,12 @@ from typing import Final
 import torch
 from torch import nn
 
-from standoff.training.darknet.cfg import Convolutional, Yolo
+from standoff.training.darknet.cfg import POINT_VALUES, Convolutional, Yolo
 from standoff.training.darknet.network import ConvolutionBlock, DarknetNetwork
 
 _OBJECT_PRIOR: Final = 0.01
+_POINT_PRIOR: Final = (0.0, 0.25, -1.1, -1.1)
+"""Across and down from the cell's middle in sides of the anchor, and the logarithms of their errors."""
 
 
 def head_convolutions(network: DarknetNetwork) -> dict[int, Yolo]:
@@ -56,8 +58,25 @@ def _initialize(block: ConvolutionBlock, generator: torch.Generator | None) -> N
 
 
 def _set_prior(block: ConvolutionBlock, head: Yolo) -> None:
+    set_point_prior(block, head)
     bias = block.convolution.bias
     assert bias is not None
     with torch.no_grad():
-        rows = bias.view(len(head.anchors_px), 5 + head.classes)
+        rows = bias.view(len(head.anchors_px), head.values)
         rows[:, 4] = -math.log((1.0 - _OBJECT_PRIOR) / _OBJECT_PRIOR)
+
+
+def set_point_prior(block: ConvolutionBlock, head: Yolo) -> None:
+    """Let a head say that points lie in the lower middle of their boxes, give or take a third: before it has learnt.
+
+    Args:
+        block: The convolution before the head; changed in place.
+        head: Without points nothing happens.
+    """
+    if not head.has_point:
+        return
+    bias = block.convolution.bias
+    assert bias is not None
+    with torch.no_grad():
+        block.convolution.weight.view(len(head.anchors_px), head.values, -1)[:, -POINT_VALUES:] = 0.0
+        bias.view(len(head.anchors_px), head.values)[:, -POINT_VALUES:] = torch.tensor(_POINT_PRIOR)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from standoff.core.homography import FloatArray
 from standoff.labels import LabelledData
 from standoff.training.architectures import ARCHITECTURES
 from standoff.training.architectures.composer import Anchors
-from standoff.training.architectures.refitted import refitted_cfg
+from standoff.training.architectures.refitted import pointed_cfg, refitted_cfg
 from standoff.training.darknet.cfg import DarknetCfg, parse_cfg, read_cfg, read_text
 from standoff.training.darknet.export import read_names
 from standoff.training.darknet.network import DarknetNetwork
@@ -20,6 +21,7 @@ from standoff.training.darknet.shapes import layer_strides
 from standoff.training.pictures.batches import open_batches
 from standoff.training.run.params import TrainParams
 from standoff.training.start.anchors import cluster_anchors, spread_over_heads
+from standoff.training.start.exported_weights import EXPORTED_SUFFIX, gives_points, is_folded
 from standoff.training.start.initial_weights import head_convolutions, initialize_layers
 from standoff.training.start.transfer import Transferred, transfer_weights
 
@@ -47,13 +49,17 @@ def boxes_in_training(data: LabelledData, params: TrainParams) -> FloatArray:
     return np.concatenate(sizes).astype(np.float64)
 
 
-def compose_cfg(arch: str, data: LabelledData, params: TrainParams) -> str:
+def compose_cfg(arch: str, data: LabelledData, params: TrainParams, weights: Path | None = None) -> str:
     """Compose the network for the data: its classes, the run's input size, anchors by k-means.
+
+    Its heads give ground points if some are marked in the training split, or if the network that it starts from has
+    them: where a site's own labels have none, what was learnt elsewhere is not thrown away.
 
     Args:
         arch: Name in `ARCHITECTURES`, or a Darknet cfg file.
         data: Gives classes and boxes.
         params: Gives the size, the augmentation and the seed.
+        weights: That it is to start from.
 
     Raises:
         ConfigError: There is no such architecture or file.
@@ -65,10 +71,32 @@ def compose_cfg(arch: str, data: LabelledData, params: TrainParams) -> str:
     found = cluster_anchors(boxes_in_training(data, params), _ANCHORS_A_HEAD * len(strides), rng)
     fine_to_coarse = spread_over_heads(found, len(strides))
     if arch in ARCHITECTURES:
-        return ARCHITECTURES[arch].compose(len(data.classes), *params.size_px, fine_to_coarse)
-    by_stride = dict(zip(sorted(strides), fine_to_coarse, strict=True))
-    anchors_px: Anchors = [by_stride[stride] for stride in strides]
-    return refitted_cfg(read_text(Path(arch), "a Darknet cfg"), len(data.classes), params.size_px, anchors_px)
+        text = ARCHITECTURES[arch].compose(len(data.classes), *params.size_px, fine_to_coarse)
+    else:
+        by_stride = dict(zip(sorted(strides), fine_to_coarse, strict=True))
+        anchors_px: Anchors = [by_stride[stride] for stride in strides]
+        text = refitted_cfg(read_text(Path(arch), "a Darknet cfg"), len(data.classes), params.size_px, anchors_px)
+    return pointed_cfg(text) if _marks_points(data) or _gives_points(weights) else text
+
+
+def _marks_points(data: LabelledData) -> bool:
+    return any(np.isfinite(picture.foot_px[~picture.ignored]).any() for picture in data.splits["train"])
+
+
+def _gives_points(weights: Path | None) -> bool:
+    """Tell whether weights belong to heads with ground points, as far as the cfg beside them says."""
+    if weights is None:
+        return False
+    if weights.suffix == EXPORTED_SUFFIX:
+        return gives_points(weights)
+    cfg = _beside(weights)[0]
+    return cfg.is_file() and read_cfg(cfg).heads[0].has_point
+
+
+def _beside(weights: Path) -> tuple[Path, Path]:
+    """Return where the cfg and the names of weights are, in the folder of a run."""
+    cfg, names = (weights.resolve().with_name(name) for name in ("network.cfg", "classes.names"))
+    return cfg, names
 
 
 def _strides(arch: str) -> tuple[int, ...]:
@@ -98,8 +126,8 @@ def fill_network(
         cfg: The network.
         classes: Names of its classes.
         weights: Darknet weights, whole or cut, of this or another number of classes; or EfficientNet-lite0's torch
-            file; or None: from scratch. `network.cfg` and `classes.names` beside them, as in the folder of a run,
-            say what they are.
+            file; or an ONNX file that `standoff export` or `standoff join` made; or None: from scratch. `network.cfg`
+            and `classes.names` beside Darknet weights, as in the folder of a run, say what they are.
         seed: For what the weights leave open.
 
     Raises:
@@ -111,10 +139,13 @@ def fill_network(
     if weights is None:
         initialize_layers(network, layers, generator)
         return network, Transferred("nothing", (), (), layers)
-    source_cfg, source_names = (weights.resolve().with_name(name) for name in ("network.cfg", "classes.names"))
-    if not (source_cfg.is_file() and source_names.is_file()):
-        return network, transfer_weights(network, weights, classes=classes, generator=generator)
-    source_classes = read_names(source_names, read_cfg(source_cfg))
-    return network, transfer_weights(
-        network, weights, source_cfg, classes=classes, source_classes=source_classes, generator=generator
-    )
+    source_cfg, source_names = _beside(weights)
+    if weights.suffix == EXPORTED_SUFFIX or not (source_cfg.is_file() and source_names.is_file()):
+        transferred = transfer_weights(network, weights, classes=classes, generator=generator)
+    else:
+        source_classes = read_names(source_names, read_cfg(source_cfg))
+        transferred = transfer_weights(
+            network, weights, source_cfg, classes=classes, source_classes=source_classes, generator=generator
+        )
+    # Also what went on from an export, in Darknet's format since, is still without statistics.
+    return network, replace(transferred, folded=is_folded(network))

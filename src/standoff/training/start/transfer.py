@@ -7,7 +7,7 @@ that it says the same boxes, and every class from the classes that it is like.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -16,14 +16,15 @@ import torch
 from torch import Tensor
 
 from standoff.core.errors import ModelError
-from standoff.training.darknet.cfg import DarknetCfg, Yolo, read_cfg
+from standoff.training.darknet.cfg import POINT_VALUES, DarknetCfg, Yolo, read_cfg
 from standoff.training.darknet.network import ConvolutionBlock, DarknetNetwork
 from standoff.training.darknet.shapes import weights_numbers
 from standoff.training.darknet.weights import fill_convolutions, read_numbers
 from standoff.training.start.anchors import overlap_of_sizes
 from standoff.training.start.class_rows import COCO_CLASSES, class_sources
 from standoff.training.start.efficientnet_weights import fill_efficientnet_lite0
-from standoff.training.start.initial_weights import head_convolutions, initialize_layers
+from standoff.training.start.exported_weights import EXPORTED_SUFFIX, read_exported
+from standoff.training.start.initial_weights import head_convolutions, initialize_layers, set_point_prior
 from standoff.training.start.weights_source import cfg_by_length, matching_layers
 
 _TORCH_SUFFIXES: Final = (".pth", ".pt")
@@ -40,6 +41,7 @@ class Transferred:
         fresh: Initialised.
         class_sources: Of each class, what it started from in the resized heads: names, or numbers where the source's
             classes have no names; empty for a class that starts afresh.
+        folded: The source's batch normalisations were folded into its kernels: there are no statistics to go on with.
     """
 
     source: str
@@ -47,6 +49,7 @@ class Transferred:
     resized: tuple[int, ...]
     fresh: tuple[int, ...]
     class_sources: tuple[tuple[str, ...], ...] = ()
+    folded: bool = False
 
 
 def transfer_weights(
@@ -63,7 +66,7 @@ def transfer_weights(
     Args:
         network: Changed in place.
         weights: Darknet weights, of all layers or cut after any of them; or a `.pth` or `.pt` file, see
-            `fill_efficientnet_lite0`.
+            `fill_efficientnet_lite0`; or an exported model, see `read_exported`.
         source_cfg: The cfg that they belong to. None: the network's own, a known architecture with another number
             of classes or with COCO's, or the network's first layers, whichever the length of the file fits.
         classes: Names of the network's classes; without them no class starts from one of another name.
@@ -73,6 +76,10 @@ def transfer_weights(
     Raises:
         ModelError: The weights belong to another architecture; says the first layer that does not fit.
     """
+    if weights.suffix == EXPORTED_SUFFIX:
+        trained, names = read_exported(network.cfg, weights)
+        started = _continued(network, trained, len(trained.convolutions()), (classes, names), generator)
+        return replace(started, source=f"the detector in {weights.name}")
     if weights.suffix in _TORCH_SUFFIXES:
         filled = fill_efficientnet_lite0(network, weights)
         return _started(network, f"EfficientNet-lite0's backbone, in {weights.name}", filled, generator)
@@ -89,14 +96,27 @@ def transfer_weights(
         return _started(network, f"{part} {filled} convolutions, in {weights.name}", filled, generator)
     trained = DarknetNetwork(source)
     filled = fill_convolutions(trained, numbers, weights.name, may_end_early=True)
+    started = _continued(network, trained, filled, (classes, source_classes), generator)
+    return replace(started, source=f"{source.name} with {source.heads[0].classes} classes, in {weights.name}")
+
+
+def _continued(
+    network: DarknetNetwork,
+    trained: DarknetNetwork,
+    filled: int,
+    classes: tuple[Sequence[str], Sequence[str]],
+    generator: torch.Generator | None,
+) -> Transferred:
+    """Fill a network from the first convolutions of a trained one, given both networks' names of classes."""
+    own_classes, source_classes = classes
     initialize_layers(network, [index for index, _ in network.convolutions()], generator)
     matches = _known_matches(network, trained, filled)
-    count, source_count = network.cfg.heads[0].classes, source.heads[0].classes
+    count, source_count = network.cfg.heads[0].classes, trained.cfg.heads[0].classes
     names = source_classes if len(source_classes) == source_count else [str(n) for n in range(source_count)]
-    rows = _class_rows(classes, source_classes, count, source_count)
+    rows = _class_rows(own_classes, source_classes, count, source_count)
     resized = _copy_layers(network, trained, matches, rows)
     return Transferred(
-        source=f"{source.name} with {source_count} classes, in {weights.name}",
+        source=trained.cfg.name,
         copied=tuple(index for index in matches if index not in resized),
         resized=resized,
         fresh=tuple(index for index, _ in network.convolutions() if index not in matches),
@@ -142,7 +162,7 @@ def _copy_layers(
             continue
         head, source_head = heads[own], source_heads[other]
         _fill_head(blocks[own], head, sources[other], source_head, rows)
-        is_same = head.anchors_px == source_head.anchors_px and head.classes == source_head.classes
+        is_same = head.anchors_px == source_head.anchors_px and head.values == source_head.values
         if not (is_same and [*rows] == [(number,) for number in range(head.classes)]):
             resized.append(own)
     return tuple(resized)
@@ -160,6 +180,7 @@ def _class_rows(
 def _fill_head(
     block: ConvolutionBlock, head: Yolo, source: ConvolutionBlock, source_head: Yolo, rows: Sequence[Sequence[int]]
 ) -> None:
+    set_point_prior(block, head)
     anchors_px, source_px = np.array(head.anchors_px), np.array(source_head.anchors_px)
     nearest = overlap_of_sizes(anchors_px, source_px).argmax(axis=1)
     with torch.no_grad():
@@ -170,13 +191,22 @@ def _fill_head(
                 if sources:
                     own[:, 5 + number] = others[:, [5 + source for source in sources]].mean(dim=1)
         # width = anchor * exp(raw): with this the new anchor says the width that the old one said
-        _, bias = _head_rows(block, head)
-        bias[:, 2:4] += torch.from_numpy(np.log(source_px[nearest] / anchors_px)).float()
+        kernels, bias = _head_rows(block, head)
+        factor = torch.from_numpy(source_px[nearest] / anchors_px).float()
+        bias[:, 2:4] += factor.log()
+        if head.has_point and source_head.has_point:
+            source_kernels, source_bias = _head_rows(source, source_head)
+            kernels[:, -POINT_VALUES:] = source_kernels[nearest, -POINT_VALUES:]
+            bias[:, -POINT_VALUES:] = source_bias[nearest, -POINT_VALUES:]
+            # The point and its error are in sides of the anchor.
+            kernels[:, -POINT_VALUES:-2] *= factor[..., None]
+            bias[:, -POINT_VALUES:-2] *= factor
+            bias[:, -2:] += factor.log()
 
 
 def _head_rows(block: ConvolutionBlock, head: Yolo) -> tuple[Tensor, Tensor]:
-    """Return kernels (A, 5 + classes, channels) and biases (A, 5 + classes), views of the block's own."""
+    """Return kernels (A, values, channels) and biases (A, values), views of the block's own."""
     bias = block.convolution.bias
     assert bias is not None
-    shape = len(head.anchors_px), 5 + head.classes
+    shape = len(head.anchors_px), head.values
     return block.convolution.weight.view(*shape, -1), bias.view(shape)

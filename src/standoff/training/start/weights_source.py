@@ -58,9 +58,10 @@ def _with_classes(cfg: DarknetCfg, classes: int) -> DarknetCfg:
     for index, layer in enumerate(cfg.layers):
         if isinstance(layer, Yolo):
             before = layers[index - 1]
+            resized = replace(layer, classes=classes)
             if isinstance(before, Convolutional):
-                layers[index - 1] = replace(before, filters=len(layer.anchors_px) * (5 + classes))
-                layers[index] = replace(layer, classes=classes)
+                layers[index - 1] = replace(before, filters=len(layer.anchors_px) * resized.values)
+                layers[index] = resized
     return replace(cfg, layers=tuple(layers))
 
 
