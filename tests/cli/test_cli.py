@@ -329,8 +329,8 @@ def test_a_polygon_on_the_command_line_is_the_reference(
     box = ("--reference-box", "100,100,150,150", "--outputs", "")
     call("run", video, "--config", site, "--out", tmp_path / "out", "--ground", words, *box)
     ground = json.loads((tmp_path / "out" / "run.json").read_text())["ground"]
-    assert np.allclose(ground["corners_m"], corners)
-    assert ground["height_m"] == (0.4 if "height" in words else None)
+    assert np.allclose(ground["references"][0]["corners_m"], corners)
+    assert ground["references"][0]["height_m"] == (0.4 if "height" in words else None)
 
 
 @pytest.mark.parametrize("factory", ["no_such_module:Thing", "cli.test_cli:unplugged"])

@@ -83,8 +83,8 @@ def test_markers_that_contradict_something_are_refused(ground: dict[str, object]
 
 def test_markers_that_no_ground_stage_reads_are_refused_not_ignored() -> None:
     marker = {"size_m": 1.0, "x_m": 4.0, "y_m": 2.0}
-    with pytest.raises(ConfigError, match="Take the markers out"):
-        build_ground(load_settings(None, {"ground": {"markers": [marker], "reference": {"square_m": 2.0}}}))
+    with pytest.raises(ConfigError, match="does not read them"):
+        build_ground(load_settings(None, {"ground": {"markers": [marker], "survey": "survey.yaml"}}))
 
 
 def test_the_command_line_s_auto_keeps_the_file_s_markers_and_none_ends_all_measuring(tmp_path: Path) -> None:

@@ -63,7 +63,7 @@ def test_a_run_leaves_all_that_it_takes_to_judge_and_to_use_it(finished: tuple[R
         "curves.png", "predictions.jpg", "best.json", "start.weights", "best.weights", "last.weights", "model.onnx",
         "model-half.onnx", "model-card.md",
     }  # fmt: skip
-    assert [row["step"] for row in heard.rows] == [20, 40, 60]
+    assert [row["step"] for row in heard.rows] == [30, 60, 90]
     assert json.loads((out / "history.json").read_text()) == heard.rows
     assert len((out / "table.md").read_text().splitlines()) == 2 + 3
     for name in ("curves.png", "predictions.jpg"):
