@@ -32,7 +32,9 @@ def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object
     To trace makes Python half as slow again, in the libraries too.
     """
     coverage = Coverage.current()
-    if coverage is None or item.path.relative_to(_TESTS).parts[0] in _COUNTED:
+    within = item.path.relative_to(_TESTS).parts if item.path.is_relative_to(_TESTS) else ()
+    if coverage is None or not within or within[0] in _COUNTED:
+        # Examples in docstrings count, too.
         return (yield)
     coverage.stop()
     try:
