@@ -53,7 +53,7 @@ def test_the_demo_writes_all_outputs_and_prints_how_far_off_it_is(drawn: Clip, t
     assert found["frames"] == drawn.frame_count
     assert {one["kind"] for one in found["encounters"]} == {"breach"}
     assert record["settings"]["ground"]["reference"]["params"]["method"] == "fused"
-    assert record["settings"]["locate"]["anchor"] == "bottom_centre"
+    assert record["settings"]["locate"]["anchor"] == "ground_point"
     # What lies on the square for a moment hides it from the paper's method, not from one that follows the picture.
     assert found["frames_with_map"] == drawn.frame_count
     assert found["paper"]["frames_with_map"] == drawn.frame_count - len(drawn_clip.HIDDEN)
