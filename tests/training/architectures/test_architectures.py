@@ -164,7 +164,7 @@ HEAD = "[yolo]\nanchors=1,1\nclasses=1\n"
     [
         (
             f"[convolutional]\nfilters=5\n{HEAD}",
-            r"6 filters before it \(1 anchors of 5 \+ 1\) in layer 1, \[yolo\] .*found 5",
+            r"6 filters before it \(1 anchors of 6\) in layer 1, \[yolo\] .*found 5",
         ),
         (f"[convolutional]\nfilters=4\ngroups=2\n{HEAD}", r"groups divide in layer 0, \[convolutional\] .*3 channels"),
         (
