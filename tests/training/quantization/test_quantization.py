@@ -155,6 +155,7 @@ def test_a_class_with_few_truths_is_named_and_does_not_decide(tmp_path: Path, sq
             xyxy_px=picture.xyxy_px[kept],
             class_id=picture.class_id[kept],
             ignored=picture.ignored[kept],
+            foot_px=picture.foot_px[kept],
         )
 
     val = tuple(thinned(picture, number < 4) for number, picture in enumerate(squares.splits["val"]))
