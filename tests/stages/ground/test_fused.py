@@ -237,3 +237,4 @@ def test_frames_taken_each_by_itself_need_no_motion() -> None:
         result = ground.update(frame(_picture(k), k / FPS), NOTHING, STILL)
         length, sigma = distance_and_sigma(_seen(result), PAIR_PX)
         assert abs(length - _true_m(_flown(k).view)) < 3.0 * sigma
+        assert _seen(result).site_frame == 0, "places of one reference can be compared from frame to frame"

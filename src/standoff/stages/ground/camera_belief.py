@@ -67,12 +67,14 @@ class CameraBelief:
     Attributes:
         source: What it rests on; None: there is none.
         keeper: Name of the reference whose height is the belief's; "" where it has none.
+        frame_of: Whose the site frame is; it goes on where the belief begins again.
         site_frame: Counts the site frames up; positions in different ones cannot be compared.
         warnings: What contradicted it, each said once.
     """
 
     def __init__(self, prior: CameraPrior) -> None:
         self._prior = prior
+        self.frame_of = ""
         self.site_frame = -1
         self.warnings: dict[str, str] = {}
         self.restart()
@@ -82,7 +84,6 @@ class CameraBelief:
         self._filter = PoseFilter()
         self.source: Source | None = None
         self.keeper = ""
-        self.frame_of = ""
         self.begun_sigma = np.inf
 
     @property
@@ -176,7 +177,9 @@ class CameraBelief:
             covariance: (8, 8) of a change of it.
             moment: The frame.
         """
-        frame_of = self.frame_of or source
-        if self.now is not None and source != self.frame_of:
-            view = in_frame_of(view, self.now.state.view)
+        frame_of: str = source
+        if self.now is not None:
+            frame_of = self.frame_of
+            if source != frame_of:
+                view = in_frame_of(view, self.now.state.view)
         self.begin(source, belief_of(view, covariance), moment, frame_of=frame_of)

@@ -135,7 +135,7 @@ class ReferenceLandmarks:
                 belief.warnings.setdefault("telemetry", text)
         frame_of = STATED if solid.reference.place_known else solid.name
         known = solid.reference.height_m is not None
-        if frame_of != belief.frame_of:
+        if frame_of != belief.frame_of or belief.now is None:
             for other in self._solids:
                 other.forget_place()
         belief.begin("reference", own, moment, frame_of=frame_of, keeper=solid.name, height_known=known, doubt=doubt)

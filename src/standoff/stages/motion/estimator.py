@@ -110,9 +110,9 @@ class MotionEstimator:
             self._breaks.note(frame, "", repeated=True)
             return replace(self._now, repeated=True) if isinstance(self._now, CameraMotion) else self._now
         movers_px = self._movers.look(frame.time_s, detections, self._step)
-        result = NoCameraMotion(broken) if broken else self._looked_at(picture, movers_px)
+        result = self._looked_at(picture, movers_px)
         if broken:
-            self._begin(picture, movers_px)
+            result = NoCameraMotion(broken)
         self._before, self._before_movers_px, self._shown_s = picture, movers_px, frame.time_s
         what = result.reason if isinstance(result, NoCameraMotion) and result.reason in _NAMED else ""
         self._breaks.note(frame, what, repeated=False)
