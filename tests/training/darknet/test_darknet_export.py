@@ -237,14 +237,18 @@ def test_points_are_exported_beside_the_boxes_and_leave_them_as_they_were(
         )
 
 
-def test_a_point_of_zeros_lies_in_the_middle_of_its_cell_and_is_unsure_by_its_anchor(
-    make_darknet_files: MakeFiles,
+@pytest.mark.parametrize("seed", range(2))
+def test_a_point_of_zeros_lies_in_the_middle_of_its_box_and_is_unsure_by_its_sides(
+    make_darknet_files: MakeFiles, seed: int
 ) -> None:
-    network = DarknetNetwork(read_cfg(make_darknet_files(pointed_cfg(ALL_LAYERS), 0).cfg))
-    for _, block in network.convolutions():
-        for parameter in block.parameters():
-            torch.nn.init.zeros_(parameter)
+    files = make_darknet_files(pointed_cfg(ALL_LAYERS), seed)
+    network = DarknetNetwork(read_cfg(files.cfg)).eval()
+    load_weights(network, files.weights)
     with torch.no_grad():
-        _, points = DecodedNetwork(network).eval().decode(network.eval()(torch.rand(1, 3, 32, 32)))
-    np.testing.assert_allclose(points[0, 3], [12, 4, 11, 7], rtol=1e-6)
-    np.testing.assert_allclose(points[0, -1], [30, 30, 3, 4], rtol=1e-6)
+        heads = []
+        for raw, head in zip(network(torch.rand(1, 3, 32, 32)), network.cfg.heads, strict=True):
+            by_anchor = raw.reshape(1, len(head.anchors_px), head.values, *raw.shape[2:]).clone()
+            by_anchor[:, :, -4:] = 0.0
+            heads.append(by_anchor.reshape(raw.shape))
+        boxes, points = DecodedNetwork(network).decode(tuple(heads))
+    torch.testing.assert_close(points, boxes[..., :4])

@@ -216,12 +216,12 @@ def test_the_published_weights_keep_seeing_people_after_the_transfer(shared_data
     torch.testing.assert_close(_rows(site)[2:300:3, :6], _rows(coco)[2:300:3, :6])
 
 
-def _points(network: DarknetNetwork) -> Tensor:
+def _boxes_and_points(network: DarknetNetwork) -> tuple[Tensor, Tensor]:
     cfg = network.cfg
     picture = torch.rand(1, 3, cfg.height_px, cfg.width_px, generator=torch.Generator().manual_seed(3))
     with torch.no_grad():
-        points: Tensor = DecodedNetwork(network).decode(network.eval()(picture))[1]
-    return points[0]
+        boxes, points = DecodedNetwork(network).decode(network.eval()(picture))
+    return boxes[0], points[0]
 
 
 def test_points_are_kept_in_pixels_whatever_the_new_anchors_are(tmp_path: Path) -> None:
@@ -229,7 +229,8 @@ def test_points_are_kept_in_pixels_whatever_the_new_anchors_are(tmp_path: Path) 
     source = _trained(text, tmp_path / "run.weights")
     target = _network(other)
     transfer_weights(target, tmp_path / "run.weights", tmp_path / "run.cfg")
-    torch.testing.assert_close(_points(target), _points(source), rtol=1e-4, atol=1e-3)
+    (_, found), (_, expected) = _boxes_and_points(target), _boxes_and_points(source)
+    torch.testing.assert_close(found, expected, rtol=1e-4, atol=1e-3)
     torch.testing.assert_close(_rows(target), _rows(source))
 
 
@@ -238,7 +239,9 @@ def test_a_head_that_learns_points_anew_begins_below_the_middle_and_unsure(tmp_p
     target = _network(pointed_cfg(yolo_fastest_xl_cfg(5, 96, 64)))
     assert transfer_weights(target, tmp_path / "run.weights", tmp_path / "run.cfg").resized == (120, 129)
     torch.testing.assert_close(_rows(target), _rows(source))
-    points, anchors_px = _points(target)[:3], torch.tensor(target.cfg.heads[0].anchors_px)
-    middle_px = torch.tensor([16.0, 16.0])
-    torch.testing.assert_close((points[:, :2] - middle_px) / anchors_px, torch.tensor([[0.0, 0.25]]).expand(3, -1))
-    assert (points[:, 2:] > 0.2 * anchors_px).all()
+    boxes, points = _boxes_and_points(target)
+    sides_px = boxes[:, 2:4]
+    torch.testing.assert_close(
+        (points[:, :2] - boxes[:, :2]) / sides_px, torch.tensor([[0.0, 0.25]]).expand(len(boxes), -1), atol=1e-4, rtol=0
+    )
+    assert (points[:, 2:] > 0.2 * sides_px).all()

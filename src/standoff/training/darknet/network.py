@@ -27,7 +27,7 @@ _LEAKY_SLOPE = 0.1
 _BATCH_NORM_EPSILON = 1e-6
 _WIDE = 5
 LOG_SIGMA = (-5.0, 3.0)
-"""Errors of a point that can be told: from 1/150 of an anchor's side, a tenth of a pixel, to 20 of them."""
+"""Errors of a point that can be told: from 1/150 of its box's side, a tenth of a pixel, to 20 of them."""
 
 
 def _activation(name: Activation) -> nn.Module:
@@ -263,25 +263,24 @@ class _HeadDecoder(nn.Module):
         decoded = decoded.reshape(-1, height * width * anchors, boxes)
         if not self.head.has_point:
             return decoded, decoded[..., :0]
-        middle_px = (self.cell + self.head.scale_xy / 2.0) * self.cell_px
-        foot_px, log_sigma = points_of(raw[..., boxes:], middle_px, self.anchors_px)
+        foot_px, log_sigma = points_of(raw[..., boxes:], centre_px, size_px)
         points = torch.cat([foot_px, log_sigma.exp()], dim=-1)
         return decoded, points.reshape(-1, height * width * anchors, POINT_VALUES)
 
 
-def points_of(raw: Tensor, middle_px: Tensor, anchors_px: Tensor) -> tuple[Tensor, Tensor]:
+def points_of(raw: Tensor, centre_px: Tensor, size_px: Tensor) -> tuple[Tensor, Tensor]:
     """Decode ground points.
 
-    A point is told from the middle of the cell that the box belongs to, in sides of the anchor: so its error does not
-    lean on the error of the box.
+    A point is told from the middle of its own box, in the box's sides: so one pose of a machine has one answer,
+    however far away it stands and wherever in its cell.
 
     Args:
         raw: (..., 4) what the last convolution says.
-        middle_px: (..., 2) middle of the cells.
-        anchors_px: (..., 2) width and height.
+        centre_px: (..., 2) middle of the boxes.
+        size_px: (..., 2) width and height of the boxes.
 
     Returns:
         (..., 2) points, and (..., 2) logarithms of their standard errors; input pixels.
     """
-    log_sigma = raw[..., 2:4].clamp(*LOG_SIGMA) + anchors_px.log()
-    return middle_px + raw[..., 0:2] * anchors_px, log_sigma
+    log_sigma = raw[..., 2:4].clamp(*LOG_SIGMA) + size_px.log()
+    return centre_px + raw[..., 0:2] * size_px, log_sigma

@@ -237,10 +237,11 @@ def _class_term(grid: _Grid, targets: _Targets) -> Tensor:
 
 def _point_term(grid: _Grid, targets: _Targets) -> Tensor:
     at = targets.picture, targets.anchor, targets.row, targets.column
-    cell = torch.stack([targets.column, targets.row], dim=1).float()
-    anchors_px = grid.anchors_px[targets.anchor]
-    foot_px, log_sigma = points_of(grid.values[at][:, -POINT_VALUES:], (cell + 0.5) * grid.cell_px, anchors_px)
-    return point_loss((foot_px - targets.feet) / anchors_px, log_sigma - anchors_px.log())
+    # What is wrong with the box is the box's to learn: the point learns to stand where it does in boxes as they are.
+    boxes = grid.boxes[at].detach()
+    centre_px, size_px = (boxes[:, :2] + boxes[:, 2:]) / 2.0, boxes[:, 2:] - boxes[:, :2]
+    foot_px, log_sigma = points_of(grid.values[at][:, -POINT_VALUES:], centre_px, size_px)
+    return point_loss((foot_px - targets.feet) / size_px, log_sigma - size_px.log())
 
 
 def _pairwise_iou(first: Tensor, second: Tensor) -> Tensor:

@@ -21,7 +21,7 @@ from standoff.training.darknet.network import ConvolutionBlock, DarknetNetwork
 
 _OBJECT_PRIOR: Final = 0.01
 _POINT_PRIOR: Final = (0.0, 0.25, -1.1, -1.1)
-"""Across and down from the cell's middle in sides of the anchor, and the logarithms of their errors."""
+"""Across and down from the box's middle in its sides, and the logarithms of their errors."""
 
 
 def head_convolutions(network: DarknetNetwork) -> dict[int, Yolo]:

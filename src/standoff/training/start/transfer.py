@@ -198,10 +198,6 @@ def _fill_head(
             source_kernels, source_bias = _head_rows(source, source_head)
             kernels[:, -POINT_VALUES:] = source_kernels[nearest, -POINT_VALUES:]
             bias[:, -POINT_VALUES:] = source_bias[nearest, -POINT_VALUES:]
-            # The point and its error are in sides of the anchor.
-            kernels[:, -POINT_VALUES:-2] *= factor[..., None]
-            bias[:, -POINT_VALUES:-2] *= factor
-            bias[:, -2:] += factor.log()
 
 
 def _head_rows(block: ConvolutionBlock, head: Yolo) -> tuple[Tensor, Tensor]:
