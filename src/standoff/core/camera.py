@@ -202,6 +202,32 @@ DRONE_FIELD_DEG = 72.0
 
 
 @dataclass(frozen=True, slots=True)
+class RadialDistortion:
+    """The lens's first radial distortion coefficient, as the motion of the picture tells it.
+
+    Attributes:
+        k1: Of a lens of this focal length.
+        sigma: Its standard error.
+        focal_px: k1 / focal_px**2 is what was told; the focal length itself is another matter.
+    """
+
+    k1: float
+    sigma: float
+    focal_px: float
+
+    def since(self, earlier: RadialDistortion) -> RadialDistortion:
+        """Return what was told since something less sure was, which is in this.
+
+        >>> news = RadialDistortion(-0.1, 0.03, 900.0).since(RadialDistortion(-0.06, 0.05, 900.0))
+        >>> round(news.k1, 4), round(news.sigma, 4)
+        (-0.1225, 0.0375)
+        """
+        information, before = self.sigma**-2, earlier.sigma**-2
+        new = information - before
+        return RadialDistortion((self.k1 * information - earlier.k1 * before) / new, new**-0.5, self.focal_px)
+
+
+@dataclass(frozen=True, slots=True)
 class CameraPrior:
     """What is known of a camera before its pictures have been looked at.
 
@@ -231,6 +257,20 @@ class CameraPrior:
         )
         camera = Camera(width_px, height_px, matrix, np.zeros(5))
         return cls(camera, focal_sigma=0.12, k1_sigma=0.06, origin="a drone's usual lens")
+
+    def with_distortion(self, told: RadialDistortion) -> CameraPrior:
+        """Return it after the motion of the picture has told of the radial distortion.
+
+        >>> prior = CameraPrior.unknown(1280, 720)
+        >>> told = RadialDistortion(-0.1, prior.k1_sigma, float(prior.camera.matrix[0, 0]))
+        >>> prior.with_distortion(told).camera.distortion[0]
+        -0.05
+        """
+        scale = (float(self.camera.matrix[0, 0]) / told.focal_px) ** 2
+        own, heard = self.k1_sigma**-2, (told.sigma * scale) ** -2
+        k1 = (own * float(self.camera.distortion[0]) + heard * told.k1 * scale) / (own + heard)
+        camera = self.camera.refocused(1.0, k1)
+        return CameraPrior(camera, self.focal_sigma, float((own + heard) ** -0.5), self.origin)
 
     def scaled_to(self, width_px: int, height_px: int) -> CameraPrior:
         """Return the same for pictures of another size and the same field of view.

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from standoff.core.camera import Camera
+from standoff.core.camera import Camera, RadialDistortion
 from standoff.core.homography import FloatArray
 
 
@@ -38,6 +38,7 @@ class CameraMotion:
         keyframe_s: Presentation timestamp of the keyframe.
         camera: The lens whose distortion was removed from the points first; None: points as seen in the picture.
         repeated: True where this frame shows the same picture as the one before.
+        distortion: Of the lens, by everything that was seen of the stream so far; None: it is known, or nothing tells.
     """
 
     keyframe_to_image: FloatArray
@@ -45,6 +46,7 @@ class CameraMotion:
     keyframe_s: float
     camera: Camera | None = None
     repeated: bool = False
+    distortion: RadialDistortion | None = None
 
     def __post_init__(self) -> None:
         for name, shape in {"keyframe_to_image": (3, 3), "covariance": (9, 9)}.items():

@@ -8,13 +8,13 @@ from typing import Literal
 
 import numpy as np
 
-from standoff.core.camera import Camera, CameraPrior
+from standoff.core.camera import Camera, CameraPrior, RadialDistortion
 from standoff.core.homography import FloatArray
 from standoff.core.pose import CHANGES, LENS, View
 from standoff.core.types import CameraMotion, Detections, Frame, ImageArray, Luma, NoCameraMotion
 from standoff.stages.ground.pose_filter import LASTING_SHARE, Estimate, PoseFilter
 from standoff.stages.ground.pose_map import length_sigma
-from standoff.stages.ground.solid import SolidState
+from standoff.stages.ground.solid import STATE, SolidState
 from standoff.stages.ground.solid_fit import Belief
 from standoff.stages.ground.view_prior import belief_of, in_frame_of
 
@@ -22,6 +22,9 @@ Source = Literal["reference", "markers", "telemetry", "sizes"]
 LANDMARKS: tuple[Source, ...] = ("reference", "markers")
 STATED = "stated"
 """The site frame that references and markers of stated places share."""
+
+_NEWS = 0.9
+"""What the motion tells of the lens is heard again when its error has become so many times as large."""
 
 
 @dataclass(eq=False)
@@ -74,6 +77,7 @@ class CameraBelief:
 
     def __init__(self, prior: CameraPrior) -> None:
         self._prior = prior
+        self._heard: RadialDistortion | None = None
         self.frame_of = ""
         self.site_frame = -1
         self.warnings: dict[str, str] = {}
@@ -121,8 +125,27 @@ class CameraBelief:
         self._prior = replace(CameraPrior.unknown(camera.width_px, camera.height_px), camera=camera)
 
     def predict(self, moment: Moment) -> None:
-        """Carry the belief to a frame by motion; the moment is then held."""
+        """Carry the belief to a frame by motion, and learn from it of the lens; the moment is then held."""
         moment.held = self._filter.predict(moment.frame.time_s, moment.motion)
+        told = moment.motion.distortion if isinstance(moment.motion, CameraMotion) else None
+        if told is not None and (self._heard is None or told.sigma < _NEWS * self._heard.sigma):
+            self._hear(told)
+
+    def _hear(self, told: RadialDistortion) -> None:
+        """Take in what the motion has told of the lens since it was heard last."""
+        news = told if self._heard is None else told.since(self._heard)
+        self._heard = told
+        self._prior = self._prior.with_distortion(news)
+        now = self.now
+        if now is None:
+            return
+        camera = now.state.view.camera
+        ratio = news.focal_px / float(camera.matrix[0, 0])
+        own_k1 = float(camera.distortion[0]) * ratio**2
+        # k1 as told goes with the square of the focal length that a lens of the same bend would have.
+        gradient = np.zeros(STATE)
+        gradient[LENS] = -2.0 * own_k1, ratio**2
+        self._filter.correct_lens(gradient, news.k1 - own_k1, news.sigma)
 
     def correct(self, state: SolidState, information: FloatArray, by: str, moment: Moment) -> None:
         """Take in an observation, as `PoseFilter.correct`; the moment is then held."""

@@ -181,16 +181,39 @@ class PoseFilter:
         fresh = min(max(since_s / self._same_s, 0.0), 1.0)
         before = _inverse(self._now.covariance)
         pull = (before + information) @ state.change_from(self._now.state)
-        covariance = _inverse(before + fresh * information)
-        change = fresh * (covariance @ pull)
+        self._offer_lasting(before, information, by)
+        self._absorb(before, fresh * information, fresh * pull)
+        self._observed_s[by] = self._now_s
+        self._lost = None
+
+    def correct_lens(self, gradient: FloatArray, off: float, sigma: float) -> None:
+        """Take in what a number that depends on the lens was found to be, independently of everything before.
+
+        Args:
+            gradient: (9,) of the number by a change of the state.
+            off: By how much it is more than the state says.
+            sigma: Its standard error.
+        """
+        assert self._now is not None, "predicted first"
+        weighted = gradient / sigma**2
+        self._absorb(_inverse(self._now.covariance), np.outer(gradient, weighted), weighted * off)
+
+    def _absorb(self, before: FloatArray, information: FloatArray, pull: FloatArray) -> None:
+        """Correct this frame's belief and the keyframe's.
+
+        Args:
+            before: (9, 9) information of this frame's belief.
+            information: (9, 9) that is added.
+            pull: (9,) what the added information makes of its own deviations.
+        """
+        assert self._key is not None and self._now is not None
+        covariance = _inverse(before + information)
+        change = covariance @ pull
         gain = self._key.covariance @ self._by_key.T @ before
         key_covariance = self._key.covariance + gain @ (covariance - self._now.covariance) @ gain.T
-        self._offer_lasting(before, information, by)
         lasting = self._lasting.total()
         self._key = Estimate(self._key.state.changed(gain @ change), (key_covariance + key_covariance.T) / 2.0, lasting)
         self._now = Estimate(self._now.state.changed(change), covariance, self._by_key @ lasting @ self._by_key.T)
-        self._observed_s[by] = self._now_s
-        self._lost = None
 
     def _offer_lasting(self, before: FloatArray, information: FloatArray, by: str) -> None:
         """Note what of an observation's error is in all others of its kind.

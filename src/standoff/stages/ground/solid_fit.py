@@ -29,6 +29,9 @@ _STRIP_BLUR_PX, _STRIP_SHARE, _STRIP_RATIO, _STRIP_DOUBT = 2.5, 0.6, 0.3, 0.35
 """A strip: two edges this near to each other along so much of the length, the fainter one with so much of the other's
 steepness. Sharpening makes such pairs, too, but fainter ones."""
 
+_RESAMPLED, _OTHER_EDGES_M = 2, 0.1
+"""So often a fit is begun again with a height that differs by so much from that whose edges it looked at."""
+
 _MIN_SAMPLES = 12
 _MAX_CHANGE = np.array([0.3, 0.3, 0.3, 20.0, 20.0, 20.0, 0.7, 0.3, 1.0])
 """A round of the fit moves no further: beyond, the derivatives say nothing."""
@@ -109,6 +112,19 @@ def fit_solid(
         Drummond and Cipolla, Real-time visual tracking of complex structures, 2002; Comport et al. 2006.
     """
     state = prior.state if start is None else start
+    fit = _fit_from(gray, shape, prior, half_px, state)
+    for _ in range(_RESAMPLED):
+        if fit is None or abs(fit.state.height_m - state.height_m) <= _OTHER_EDGES_M:
+            break
+        # Which edges show depends on the height: what was looked at was another solid.
+        state = fit.state
+        fit = _fit_from(gray, shape, prior, half_px, state)
+    return fit
+
+
+def _fit_from(
+    gray: Luma, shape: ReferenceShape, prior: Belief, half_px: float, state: SolidState
+) -> SolidFit | None:
     samples = sample_edges(shape, state)
     picture = Blurred.around(gray, samples.points_px, half_px) if len(samples) else None
     if picture is None:

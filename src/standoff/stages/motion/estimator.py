@@ -19,6 +19,7 @@ from standoff.stages.motion.movers import Movers
 from standoff.stages.motion.params import MotionParams
 from standoff.stages.motion.picture import FollowedPicture
 from standoff.stages.motion.plane import relief_covariance
+from standoff.stages.motion.self_calibration import SelfCalibration
 from standoff.stages.motion.zoom import ZoomWatch
 
 CUT = "the picture was cut"
@@ -47,7 +48,8 @@ class MotionEstimator:
 
     Args:
         params: Settings; None takes the defaults.
-        camera: The lens, whose distortion is removed from the points first; None: points as seen in the picture.
+        camera: The lens, whose distortion is removed from the points first; None: it is learned from how the ground
+            bends between keyframes, and removed as soon as it is sure.
     """
 
     def __init__(self, params: MotionParams | None = None, camera: Camera | None = None) -> None:
@@ -73,6 +75,7 @@ class MotionEstimator:
 
     def _forget(self) -> None:
         self._lens = Lens(None, (0, 0))
+        self._calibration: SelfCalibration | None = None
         self._noise_px = np.nan
         self._before: FollowedPicture | None = None
         self._before_movers_px = np.zeros((0, 4))
@@ -105,6 +108,8 @@ class MotionEstimator:
             self._forget()
         if self._before is None:
             self._lens = Lens(self._camera_for(frame.size_px), frame.size_px)
+            if self._given_camera is None:
+                self._calibration = SelfCalibration(frame.size_px)
         elif picture.repeats(self._before):
             self._shown_s = frame.time_s
             self._breaks.note(frame, "", repeated=True)
@@ -151,13 +156,26 @@ class MotionEstimator:
         worn_out = self._key.is_worn_out(match, np.array(picture.size_px) / 2.0)
         if worn_out:
             match = self._key.find_better(picture, match, movers_px)
+            self._calibrate(match, picture)
         self._pose, self._pose_s = match.plane.matrix, picture.time_s
         # The keyframe may have been given up for a nearer one in the search.
-        result = CameraMotion(self._pose, self._covariance(match), self._key.picture.time_s, self._lens.camera)
+        result = self._motion_since(self._key, self._pose, self._covariance(match))
         self._now = result
         if worn_out:
             self._renew(picture, movers_px)
         return result
+
+    def _motion_since(self, key: Keyframe, pose: FloatArray, covariance: FloatArray) -> CameraMotion:
+        distortion = None if self._calibration is None else self._calibration.told
+        return CameraMotion(pose, covariance, key.picture.time_s, key.lens.camera, distortion=distortion)
+
+    def _calibrate(self, match: Match, picture: FollowedPicture) -> None:
+        """Learn of the lens, for the keyframes to come: points of one keyframe keep the lens that they began with."""
+        if self._calibration is None:
+            return
+        followed_px = float(picture.full_per_small.mean())
+        self._calibration.take(*match.seen_px, inlier_px=self._params.inlier_px * followed_px, followed_px=followed_px)
+        self._lens = Lens(self._calibration.camera, picture.size_px)
 
     def _covariance(self, match: Match) -> FloatArray:
         """Return the covariance with the ground's relief; before noise can be told from it, all is noise."""
@@ -209,7 +227,7 @@ class MotionEstimator:
         key = Keyframe(picture, movers_px, self._lens, self._params)
         if key.usable:
             self._key, self._pose = key, np.eye(3)
-            self._now = CameraMotion(np.eye(3), np.zeros((9, 9)), picture.time_s, self._lens.camera)
+            self._now = self._motion_since(key, np.eye(3), np.zeros((9, 9)))
 
     def _forget_step(self) -> None:
         self._step = None

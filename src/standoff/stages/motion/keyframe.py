@@ -38,6 +38,7 @@ class Match:
         noise_px: Standard error of a point along an axis by how the residuals changed since the picture before; NaN
             where it is not known.
         surprise_px: How far the points of the ground were from where they were looked for, the median; followed px.
+        seen_px: (K, 2) each: points of the keyframe, and where they are in the picture; as seen, lens and all.
     """
 
     plane: PlaneMotion
@@ -45,6 +46,7 @@ class Match:
     inliers: int
     noise_px: float
     surprise_px: float
+    seen_px: tuple[FloatArray, FloatArray]
 
 
 @dataclass(slots=True, eq=False)
@@ -72,6 +74,25 @@ class _Points:
         return cls(small_px, ideal_px, np.ones(len(small_px)), np.full_like(small_px, np.nan))
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Found:
+    """Points of a keyframe that were followed to another picture.
+
+    Attributes:
+        which: (K,) of the keyframe's points.
+        target_px: (K, 2) where they are, as seen.
+        target: (K, 2) the same without distortion.
+        off_px: (K,) how far from where they were looked for; followed px.
+        in_view: How many were looked for.
+    """
+
+    which: IntArray
+    target_px: FloatArray
+    target: FloatArray
+    off_px: FloatArray
+    in_view: int
+
+
 class Keyframe:
     """A picture and well-textured points spread over it.
 
@@ -87,7 +108,7 @@ class Keyframe:
 
     def __init__(self, picture: FollowedPicture, movers_px: FloatArray, lens: Lens, params: MotionParams) -> None:
         self.picture = picture
-        self._lens, self._params = lens, params
+        self.lens, self._params = lens, params
         edge = params.window_px // 2 + 1
         self._points = _Points.of(picture.corners(params.points, movers_px, edge), picture, lens)
         self._more_points = _Points.of(picture.corners(_MORE * params.points, movers_px, edge), picture, lens)
@@ -121,12 +142,12 @@ class Keyframe:
         """
         expected, _ = homography.apply(match.plane.matrix, self._more_points.ideal_px)
         better = self._found(self._more_points, picture, expected, movers_px, 0)
-        return match if better is None else replace(match, plane=better.plane)
+        return match if better is None else replace(match, plane=better.plane, seen_px=better.seen_px)
 
     def _found(
         self, points: _Points, picture: FollowedPicture, expected: FloatArray, movers_px: FloatArray, levels: int
     ) -> Match | None:
-        start_px = self._lens.distorted(expected)
+        start_px = self.lens.distorted(expected)
         seen = self._in_view(picture, start_px, movers_px)
         if np.count_nonzero(seen) < self._params.min_points:
             return None
@@ -139,12 +160,13 @@ class Keyframe:
             levels=levels,
             round_trip_px=self._params.round_trip_px,
         )
-        target = picture.to_full(end_px)
-        good &= ~inside(target, movers_px)
-        target = self._lens.undistorted(target)
+        target_px = picture.to_full(end_px)
+        good &= ~inside(target_px, movers_px)
+        target = self.lens.undistorted(target_px)
         good &= np.isfinite(target).all(axis=1)
         off_px = np.linalg.norm(end_px - picture.to_small(start_px[seen]), axis=1)[good]
-        return self._agreed(points, picture, np.flatnonzero(seen)[good], target[good], off_px, int(seen.sum()))
+        which = np.flatnonzero(seen)[good]
+        return self._agreed(points, picture, _Found(which, target_px[good], target[good], off_px, int(seen.sum())))
 
     def expect(self, pose: FloatArray, step: FloatArray | None, ratio: float) -> FloatArray:
         """Return (N, 2) where the points should be: where they were last, and on by a share of the last step.
@@ -183,17 +205,10 @@ class Keyframe:
             turned_deg > params.max_turn_deg or scales[0] > params.max_scale or scales[1] < 1.0 / params.max_scale
         )
 
-    def _agreed(
-        self,
-        points: _Points,
-        picture: FollowedPicture,
-        which: IntArray,
-        target: FloatArray,
-        off_px: FloatArray,
-        in_view: int,
-    ) -> Match | None:
-        """Return what most of the points `which` (K,) tell, found at `target` (K, 2) without distortion."""
+    def _agreed(self, points: _Points, picture: FollowedPicture, found: _Found) -> Match | None:
+        """Return what most of the points that were found again tell."""
         params, scale = self._params, float(picture.full_per_small.mean())
+        which, target = found.which, found.target
         plane = fit_plane(
             points.ideal_px[which],
             target,
@@ -204,7 +219,7 @@ class Keyframe:
         if plane is None:
             return None
         inliers = int(np.count_nonzero(plane.inlier))
-        if inliers < max(params.min_points, params.min_inliers * in_view):
+        if inliers < max(params.min_points, params.min_inliers * found.in_view):
             return None
         if not _is_spread(picture.to_small(target[plane.inlier]), picture):
             return None
@@ -212,7 +227,14 @@ class Keyframe:
         changed = (plane.residual_px - points.residual_px[which])[plane.inlier]
         points.residual_px[:] = np.nan
         points.residual_px[which] = plane.residual_px
-        return Match(plane, in_view, inliers, _noise_px(changed), float(np.median(off_px[plane.inlier])))
+        return Match(
+            plane=plane,
+            in_view=found.in_view,
+            inliers=inliers,
+            noise_px=_noise_px(changed),
+            surprise_px=float(np.median(found.off_px[plane.inlier])),
+            seen_px=(self.picture.to_full(points.small_px[which]), found.target_px),
+        )
 
     def _in_view(self, picture: FollowedPicture, start_px: FloatArray, movers_px: FloatArray) -> BoolArray:
         edge = self._params.window_px / 2.0

@@ -31,6 +31,7 @@ from standoff.training.run.optimization import (
     set_trainable,
 )
 from standoff.training.run.params import TrainParams
+from standoff.training.run.precision import autocast
 from standoff.training.run.validation import validate
 
 _STEPS_OF_ONE_SCALE = 10
@@ -201,14 +202,14 @@ class Trainer:
             for side in self._params.size_px
         )
         pixels = torch.zeros(pictures, 3, height_px, width_px, device=self._crew.device)
-        with torch.autocast(self._crew.device.type, torch.bfloat16, enabled=self._params.bf16):
+        with autocast(self._crew.device, bf16=self._params.bf16):
             heads = self._network(pixels.contiguous(memory_format=torch.channels_last))
         torch.autograd.backward([head.float().sum() for head in heads])
         self._optimizer.zero_grad(set_to_none=True)
 
     def _loss(self, model: nn.Module, batch: Batch) -> LossTerms:
         pixels = batch.pictures.to(memory_format=torch.channels_last).float() / 255.0
-        with torch.autocast(self._crew.device.type, torch.bfloat16, enabled=self._params.bf16):
+        with autocast(self._crew.device, bf16=self._params.bf16):
             heads: tuple[Tensor, ...] = model(pixels)
         return yolo_loss(heads, self._network.cfg.heads, batch, self._params.loss)
 

@@ -42,7 +42,9 @@ class TrainParams:
     frozen_layers: Annotated[int, Ge(0), Doc("Layers, from the first, that never move.")] = 0
     frozen_norm: Annotated[bool, Doc("Keep the batch normalisation statistics of the backbone as they came.")] = False
     ema: Annotated[float, Interval(ge=0, lt=1), Doc("Decay of the averaged weights that are kept; 0 is none.")] = 0.999
-    bf16: Annotated[bool, Doc("Compute in bfloat16 where it is safe.")] = True
+    bf16: Annotated[
+        bool, Doc("Compute in bfloat16 where that is safe and processor or GPU have instructions for it.")
+    ] = True
     seed: Annotated[int, Ge(0), Doc("Of everything random.")] = 0
     workers: Annotated[int, Ge(0), Doc("Processes that prepare pictures.")] = 1
     validate_every: Annotated[int, Ge(1), Doc("Steps between validations; each is a row of the table.")] = 500

@@ -18,6 +18,7 @@ from standoff.stages.detect.letterbox import Letterbox, resize
 from standoff.stages.detect.outputs import read_rows as read_candidates
 from standoff.stages.detect.suppression import suppress
 from standoff.training.darknet.network import DarknetNetwork, DecodedNetwork
+from standoff.training.run.precision import autocast
 
 _LEAST_SCORE = 0.01
 _MOST_ROWS = 1000
@@ -49,7 +50,7 @@ def detect_pictures(
         letterbox = Letterbox.fit(picture.size_px, size_px)
         blob = letterbox.network_input(resize(image, letterbox.inner_size_px))
         with torch.inference_mode():
-            with torch.autocast(device.type, torch.bfloat16, enabled=bf16):
+            with autocast(device, bf16=bf16):
                 pixels = torch.from_numpy(blob).to(device).contiguous(memory_format=torch.channels_last)
                 heads = network(pixels)
             # bfloat16 has 8 bits: a box at 640 px would be rounded to 4.
