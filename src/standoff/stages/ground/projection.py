@@ -13,6 +13,19 @@ from standoff.core.pose import CHANGES, View
 from standoff.stages.ground.compiled import compiled
 
 
+Eye = tuple[FloatArray, FloatArray, FloatArray, FloatArray, float]
+
+
+def eye_of(view: View) -> Eye:
+    """Return what compiled loops take for a view.
+
+    That is its position (3,), its rotation (3, 3), its camera matrix (3, 3), its distortion (5,), and the square of
+    the radius at which the lens's polynomial first turns back.
+    """
+    camera = view.camera
+    return view.position_m, view.site_to_camera, camera.matrix, camera.distortion, camera.first_fold_r2()
+
+
 def project(view: View, points_m: FloatArray) -> FloatArray:
     """Show where points of the site appear, as `View.project`.
 
@@ -23,9 +36,7 @@ def project(view: View, points_m: FloatArray) -> FloatArray:
     Returns:
         (N, 2) pixels, in or outside the picture; NaN behind the camera or outside the lens model.
     """
-    camera = view.camera
-    lens = camera.matrix, camera.distortion, camera.first_fold_r2()
-    return _seen(np.ascontiguousarray(points_m), view.position_m, view.site_to_camera, *lens)
+    return seen(np.ascontiguousarray(points_m), *eye_of(view))
 
 
 def project_with_jacobians(view: View, points_m: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -39,13 +50,13 @@ def project_with_jacobians(view: View, points_m: FloatArray) -> tuple[FloatArray
         (N, 2) pixels as seen in the picture; (N, 2, 8) their derivative by a change of the view; (N, 2, 3) by the
         points; NaN behind the camera.
     """
-    return _projected(
+    return projected(
         np.ascontiguousarray(points_m), view.position_m, view.site_to_camera, view.camera.matrix, view.camera.distortion
     )
 
 
 @compiled
-def _seen(
+def seen(
     points_m: FloatArray,
     position_m: FloatArray,
     rotation: FloatArray,
@@ -53,6 +64,7 @@ def _seen(
     distortion: FloatArray,
     first_fold_r2: float,
 ) -> FloatArray:
+    """Return what `project` does, for an eye as `eye_of` tells it."""
     pixels = np.full((len(points_m), 2), np.nan)
     in_camera, bent, slope = np.empty(3), np.empty(2), np.empty((2, 2))
     for n in range(len(points_m)):
@@ -69,13 +81,14 @@ def _seen(
 
 
 @compiled
-def _projected(
+def projected(
     points_m: FloatArray,
     position_m: FloatArray,
     rotation: FloatArray,
     matrix: FloatArray,
     distortion: FloatArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return what `project_with_jacobians` does."""
     count = len(points_m)
     pixels, by_view, by_point = np.empty((count, 2)), np.empty((count, 2, CHANGES)), np.empty((count, 2, 3))
     in_camera, bent, slope, by_camera = np.empty(3), np.empty(2), np.empty((2, 2)), np.empty(3)
