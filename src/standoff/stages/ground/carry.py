@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from standoff.core import homography
-from standoff.core.camera import Camera
 from standoff.core.homography import FloatArray
-from standoff.core.pose import LENS, POSE, View
+from standoff.core.pose import View
 from standoff.core.types import CameraMotion
-from standoff.stages.ground.projection import project_with_jacobians
+from standoff.stages.ground.compiled import compiled
+from standoff.stages.ground.projection import on_ground, projected, turned_by
 from standoff.stages.ground.solid import STATE
 
 _COLUMNS, _ROWS = 7, 5
@@ -19,8 +19,10 @@ _MIN_POINTS = 8
 _FAR_HEIGHTS = 8.0
 """Ground further away than so many times the camera's height is too near the horizon to carry anything."""
 
-_ROUNDS = 5
+_ROUNDS, _STILL = 5, 1e-7
 _MAX_MISFIT_PX = 4.0
+
+_GRID = np.array([(column, row) for row in range(_ROWS) for column in range(_COLUMNS)], dtype=np.float64)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,73 +64,125 @@ def carry(key: View, motion: CameraMotion, guess: View) -> Carried | None:
     Returns:
         The view and its derivatives, or None where no camera could have moved the picture so.
     """
+    camera, lens_known = key.camera, motion.camera is not None
     # Motion of undistorted points is motion in the pictures of a camera without distortion.
-    camera = key.camera if motion.camera is None else _straight(key.camera)
-    then = View(camera, key.position_m, key.site_to_camera)
-    now = View(camera, guess.position_m, guess.site_to_camera)
-    seen_px, places = _ground_grid(then)
-    moved_px, valid = homography.apply(motion.keyframe_to_image, seen_px)
-    seen_px, places, moved_px = seen_px[valid], places[valid], moved_px[valid]
+    distortion, fold_r2 = (np.zeros(5), np.inf) if lens_known else (camera.distortion, camera.first_fold_r2())
+    then = key.position_m, key.site_to_camera, camera.matrix, distortion
+    grid_px = (_GRID + 0.5) * np.array([camera.width_px / _COLUMNS, camera.height_px / _ROWS])
+    seen_px, places, moved_px = _ground_moved(grid_px, motion.keyframe_to_image, *then, fold_r2)
     if len(seen_px) < _MIN_POINTS:
         return None
-    for _ in range(_ROUNDS):
-        points_px, by_view, _ = project_with_jacobians(now, places)
-        misfit = (moved_px - points_px).ravel()
-        if not np.isfinite(misfit).all():
+    lens = camera.matrix, distortion
+    try:
+        position_m, rotation, rms_px = _follow(places, moved_px, guess.position_m, guess.site_to_camera, *lens)
+        if not rms_px < _MAX_MISFIT_PX:
             return None
-        change = np.zeros(8)
-        change[POSE] = np.linalg.lstsq(by_view[:, :, POSE].reshape(-1, 6), misfit, rcond=None)[0]
-        now = now.changed(change)
-        if np.abs(change).max() < 1e-7:
-            break
-    points_px, by_view, by_point = project_with_jacobians(now, places)
-    misfit = (moved_px - points_px).ravel()
-    rms_px = float(np.sqrt((misfit**2).mean()))
-    if not rms_px < _MAX_MISFIT_PX:
+        by_key, added = _errors(
+            seen_px, places, moved_px, motion.keyframe_to_image, motion.covariance, position_m, rotation, rms_px,
+            lens_known, *then,
+        )
+    except np.linalg.LinAlgError:
         return None
-    solve = np.asarray(np.linalg.pinv(by_view[:, :, POSE].reshape(-1, 6)), dtype=np.float64)
-    return Carried(
-        view=View(key.camera, now.position_m, now.site_to_camera),
-        by_key=_by_key(then, places, by_view, by_point, solve, lens_known=motion.camera is not None),
-        added=_added(motion, seen_px, solve, rms_px),
-    )
+    return Carried(View(camera, position_m, rotation), by_key, added)
 
 
-def _by_key(
-    then: View, places: FloatArray, by_view: FloatArray, by_point: FloatArray, solve: FloatArray, *, lens_known: bool
-) -> FloatArray:
-    """Return (9, 9): the points of the ground move with the keyframe's state, and the view now follows them."""
-    _, then_by_view, then_by_point = project_with_jacobians(then, places)
-    ground_by_key = -np.linalg.solve(then_by_point[:, :, :2], then_by_view)
-    image_by_key = by_point[:, :, :2] @ ground_by_key
-    image_by_key[:, :, LENS] += by_view[:, :, LENS]
+@compiled
+def _ground_moved(
+    grid_px: FloatArray,
+    keyframe_to_image: FloatArray,
+    position_m: FloatArray,
+    rotation: FloatArray,
+    matrix: FloatArray,
+    distortion: FloatArray,
+    first_fold_r2: float,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return those of the points (G, 2) of the keyframe that show ground, near enough and still ahead after the motion.
+
+    Returns:
+        (N, 2) themselves; (N, 3) the places that they show; (N, 2) where these are in the picture now.
+    """
+    xy_m = on_ground(grid_px, position_m, rotation, matrix, distortion, first_fold_r2)
+    seen_px, places, moved_px = np.empty_like(grid_px), np.zeros((len(grid_px), 3)), np.empty_like(grid_px)
+    found = 0
+    for n in range(len(grid_px)):
+        away_m = np.sqrt((xy_m[n, 0] - position_m[0]) ** 2 + (xy_m[n, 1] - position_m[1]) ** 2)
+        x, y, w = keyframe_to_image @ np.array([grid_px[n, 0], grid_px[n, 1], 1.0])
+        if away_m < _FAR_HEIGHTS * abs(position_m[2]) and w > 0.0:
+            seen_px[found], places[found, :2] = grid_px[n], xy_m[n]
+            moved_px[found, 0], moved_px[found, 1] = x / w, y / w
+            found += 1
+    return seen_px[:found], places[:found], moved_px[:found]
+
+
+@compiled
+def _follow(
+    places: FloatArray,
+    moved_px: FloatArray,
+    position_m: FloatArray,
+    rotation: FloatArray,
+    matrix: FloatArray,
+    distortion: FloatArray,
+) -> tuple[FloatArray, FloatArray, float]:
+    """Return the position (3,) and rotation (3, 3) from which places are seen nearest to where they moved.
+
+    And how far off they are, root mean square; NaN where they are behind the camera.
+    """
+    position_m, rotation = position_m.copy(), rotation.copy()
+    for _ in range(_ROUNDS):
+        points_px, by_view, _ = projected(places, position_m, rotation, matrix, distortion)
+        misfit = (moved_px - points_px).reshape(-1)
+        by_pose = np.ascontiguousarray(by_view.reshape(-1, 8)[:, :6])
+        if not np.isfinite(misfit).all():
+            return position_m, rotation, np.nan
+        change = np.linalg.solve(by_pose.T @ by_pose, by_pose.T @ misfit)
+        position_m, rotation = position_m + change[3:6], turned_by(change[:3], rotation)
+        if np.abs(change).max() < _STILL:
+            break
+    misfit = moved_px - projected(places, position_m, rotation, matrix, distortion)[0]
+    return position_m, rotation, np.sqrt((misfit**2).mean())
+
+
+@compiled
+def _errors(
+    seen_px: FloatArray,
+    places: FloatArray,
+    moved_px: FloatArray,
+    keyframe_to_image: FloatArray,
+    motion_covariance: FloatArray,
+    position_m: FloatArray,
+    rotation: FloatArray,
+    rms_px: float,
+    lens_known: bool,
+    then_position_m: FloatArray,
+    then_rotation: FloatArray,
+    matrix: FloatArray,
+    distortion: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Return (9, 9) `Carried.by_key` and (9, 9) `Carried.added`.
+
+    The points of the ground move with the keyframe's state, and the view now follows them. The pose takes its share of
+    the motion's error, and of what no pose explains of the motion.
+    """
+    count = len(places)
+    _, by_view, by_point = projected(places, position_m, rotation, matrix, distortion)
+    _, then_by_view, then_by_point = projected(places, then_position_m, then_rotation, matrix, distortion)
+    by_pose = np.ascontiguousarray(by_view.reshape(-1, 8)[:, :6])
+    image_by_key, by_entries = np.empty((count, 2, 8)), np.zeros((count, 2, 9))
+    for n in range(count):
+        ground_by_key = -np.linalg.solve(np.ascontiguousarray(then_by_point[n, :, :2]), then_by_view[n])
+        image_by_key[n] = np.ascontiguousarray(by_point[n, :, :2]) @ ground_by_key
+        image_by_key[n, :, 6:] += by_view[n, :, 6:]
+        over_w = np.array([seen_px[n, 0], seen_px[n, 1], 1.0])
+        over_w /= (keyframe_to_image[2] * over_w).sum()
+        by_entries[n, 0, :3] = by_entries[n, 1, 3:6] = over_w
+        by_entries[n, 0, 6:], by_entries[n, 1, 6:] = -moved_px[n, 0] * over_w, -moved_px[n, 1] * over_w
     if lens_known:
         image_by_key[:, :, 7] = 0.0
-    by_key = np.eye(STATE)
-    by_key[POSE, :8] = -solve @ image_by_key.reshape(-1, 8)
-    return by_key
-
-
-def _added(motion: CameraMotion, seen_px: FloatArray, solve: FloatArray, rms_px: float) -> FloatArray:
-    """Return (9, 9) the pose's share of the motion's error, and of what no pose explains of the motion."""
-    by_entries = homography.parameter_jacobian(motion.keyframe_to_image, seen_px).reshape(-1, 9)
-    to_pose = solve @ by_entries
-    added = np.zeros((STATE, STATE))
-    added[POSE, POSE] = to_pose @ motion.covariance @ to_pose.T
+    variance = np.linalg.inv(by_pose.T @ by_pose)
+    solve = variance @ by_pose.T
+    to_pose = solve @ by_entries.reshape(-1, 9)
+    by_key, added = np.eye(STATE), np.zeros((STATE, STATE))
+    by_key[:6, :8] = -solve @ image_by_key.reshape(-1, 8)
     # The misfit is smooth over the picture: its eight degrees of freedom count, not the number of points.
-    added[POSE, POSE] += rms_px**2 * (len(seen_px) / 4.0) * (solve @ solve.T)
-    return added
-
-
-def _straight(camera: Camera) -> Camera:
-    return Camera(camera.width_px, camera.height_px, camera.matrix, np.zeros(5))
-
-
-def _ground_grid(view: View) -> tuple[FloatArray, FloatArray]:
-    """Return (N, 2) pixels spread over the ground in the picture, and (N, 3) the places that they show."""
-    width, height = view.camera.width_px, view.camera.height_px
-    x, y = np.meshgrid((np.arange(_COLUMNS) + 0.5) / _COLUMNS * width, (np.arange(_ROWS) + 0.5) / _ROWS * height)
-    points_px = np.column_stack([x.ravel(), y.ravel()])
-    xy_m = view.to_plane(points_px)
-    near = np.linalg.norm(xy_m - view.position_m[:2], axis=1) < _FAR_HEIGHTS * abs(view.position_m[2])
-    return points_px[near], np.column_stack([xy_m[near], np.zeros(near.sum())])
+    added[:6, :6] = to_pose @ motion_covariance @ to_pose.T + rms_px**2 * (count / 4.0) * variance
+    return by_key, added

@@ -7,6 +7,8 @@ import numpy as np
 from standoff.core.homography import FloatArray, invert, point_jacobian
 from standoff.core.pose import CHANGES, View
 from standoff.core.types import GroundMap
+from standoff.stages.ground.compiled import compiled
+from standoff.stages.ground.projection import eye_of, on_ground, projected
 
 
 def map_from_view(
@@ -103,18 +105,35 @@ def length_sigma(view: View, covariance: FloatArray) -> float:
     Returns:
         Infinite where no ground is seen there.
     """
-    points_m = np.column_stack([view.to_plane(_AT * [view.camera.width_px, view.camera.height_px]), np.zeros(len(_AT))])
+    at_px = _AT * [view.camera.width_px, view.camera.height_px]
+    return _length_sigma(at_px, np.ascontiguousarray(covariance), *eye_of(view))
+
+
+@compiled
+def _length_sigma(
+    at_px: FloatArray,
+    covariance: FloatArray,
+    position_m: FloatArray,
+    rotation: FloatArray,
+    matrix: FloatArray,
+    distortion: FloatArray,
+    first_fold_r2: float,
+) -> float:
+    points_m = np.zeros((len(at_px), 3))
+    points_m[:, :2] = on_ground(at_px, position_m, rotation, matrix, distortion, first_fold_r2)
     if not np.isfinite(points_m).all():
         return np.inf
-    _, by_view, by_point = view.project_with_jacobians(points_m)
-    # A pixel stays where it is, so its place on the ground moves.
-    by_change = -np.linalg.solve(by_point[:, :, :2], by_view)
+    _, by_view, by_point = projected(points_m, position_m, rotation, matrix, distortion)
     worst = 0.0
-    for start, end in ((0, 1), (2, 3)):
-        apart_m = (points_m[end] - points_m[start])[:2]
-        longer = apart_m @ (by_change[end] - by_change[start]) / (apart_m @ apart_m)
-        worst = max(worst, float(longer @ covariance @ longer))
-    return float(np.sqrt(worst))
+    for start in (0, 2):
+        apart_m = points_m[start + 1, :2] - points_m[start, :2]
+        longer = np.zeros(CHANGES)
+        for at, sign in ((start, 1.0), (start + 1, -1.0)):
+            # A pixel stays where it is, so its place on the ground moves.
+            moves = np.linalg.solve(np.ascontiguousarray(by_point[at, :, :2]), by_view[at])
+            longer += sign * (apart_m[0] * moves[0] + apart_m[1] * moves[1]) / (apart_m**2).sum()
+        worst = max(worst, (longer * (covariance @ longer)).sum())
+    return np.sqrt(worst)
 
 
 def middle_scale_m_per_px(view: View) -> float:

@@ -8,11 +8,11 @@ import numpy as np
 
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import IntArray, Luma
-from standoff.stages.ground.projection import project, project_with_jacobians
+from standoff.stages.ground.projection import project
 from standoff.stages.ground.shape import ReferenceShape
 from standoff.stages.ground.solid import EdgeSamples, SolidState, sample_edges
 from standoff.stages.ground.solid_edges import Blurred, Looks, look_across
-from standoff.stages.ground.solid_rounds import choose_edges, edge_medians, expect_edges, normal_equations, weigh
+from standoff.stages.ground.solid_rounds import associate, edge_medians, find_change, normal_equations, support_of, weigh
 
 _ROUNDS, _SETTLED_ROUNDS = 4, 2
 _STILL_PX = 0.01
@@ -29,7 +29,6 @@ _STRIP_BLUR_PX, _STRIP_SHARE, _STRIP_RATIO, _STRIP_DOUBT = 2.5, 0.6, 0.3, 0.35
 """A strip: two edges this near to each other along so much of the length, the fainter one with so much of the other's
 steepness. Sharpening makes such pairs, too, but fainter ones."""
 
-_MIN_SAMPLES = 12
 _MAX_CHANGE = np.array([0.3, 0.3, 0.3, 20.0, 20.0, 20.0, 0.7, 0.3, 1.0])
 """A round of the fit moves no further: beyond, the derivatives say nothing."""
 
@@ -163,18 +162,17 @@ def outline_support(picture: Blurred, shape: ReferenceShape, state: SolidState) 
 
 def _step(samples: EdgeSamples, looks: Looks, place: _Place, prior: Belief) -> tuple[FloatArray, float] | None:
     """Return the change (9,) that one round finds, and how far it moves a sample; None if too little is there."""
-    residual, found, jacobian = _associated(samples, looks, place.state, place.gate_px)
-    weight, scatter_px = weigh(residual, found, looks.inside, samples.edge, samples.doubt_px)
-    believed = weight > 0.0
-    if np.count_nonzero(believed) < _MIN_SAMPLES:
-        return None
-    information, pull = normal_equations(jacobian, residual, weight, scatter_px, samples.edge, samples.doubt_px)
-    pull -= prior.information @ place.state.change_from(prior.state)
-    change = np.asarray(np.linalg.solve(information + prior.information, pull), dtype=np.float64)
-    if not np.isfinite(change).all():
-        return None
-    change = np.clip(change, -_MAX_CHANGE, _MAX_CHANGE)
-    return change, float(np.abs(jacobian[believed] @ change).max())
+    prior_pull = -prior.information @ place.state.change_from(prior.state)
+    change, moved_px = find_change(
+        *_associated(samples, looks, place.state, place.gate_px),
+        looks.inside,
+        samples.edge,
+        samples.doubt_px,
+        prior.information,
+        prior_pull,
+        _MAX_CHANGE,
+    )
+    return None if np.isnan(moved_px) else (change, moved_px)
 
 
 def _paired(samples: EdgeSamples, looks: Looks) -> tuple[EdgeSamples, Looks]:
@@ -241,25 +239,25 @@ def _finished(samples: EdgeSamples, looks: Looks, state: SolidState) -> SolidFit
 def _associated(
     samples: EdgeSamples, looks: Looks, state: SolidState, gate_px: float
 ) -> tuple[FloatArray, BoolArray, FloatArray]:
-    """Choose an edge of the picture for each sample.
-
-    Returns:
-        (N,) distance from the state's edge to the chosen one along the normal, 0 where there is none; (N,) whether
-        there is one; (N, 9) how the state's edge moves along the normal.
-    """
-    moved_px, jacobian = expect_edges(
-        *project_with_jacobians(state.view, samples.points_m(state.height_m)),
+    """Choose an edge of the picture for each sample; see `associate`."""
+    view = state.view
+    return associate(
+        view.position_m,
+        view.site_to_camera,
+        view.camera.matrix,
+        view.camera.distortion,
+        state.height_m,
+        samples.xy_m,
+        samples.z_share,
         samples.points_px,
         samples.normal,
-        samples.z_share,
+        samples.edge,
+        len(samples.length_px),
+        looks.offset_px,
+        looks.steepness,
+        gate_px,
     )
-    count = len(samples.length_px)
-    return *choose_edges(moved_px, samples.edge, count, looks.offset_px, looks.steepness, gate_px), jacobian
 
 
 def _support(samples: EdgeSamples, looks: Looks, residual: FloatArray, found: BoolArray) -> FloatArray:
-    count = len(samples.length_px)
-    hits = np.bincount(samples.edge, found & (np.abs(residual) <= _SUPPORT_PX + samples.doubt_px[samples.edge]), count)
-    looked = np.bincount(samples.edge, looks.inside, count)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return np.where(looked > 0, hits / looked, np.nan)
+    return support_of(residual, found, looks.inside, samples.edge, samples.doubt_px, _SUPPORT_PX)
