@@ -10,7 +10,7 @@ from standoff.core import homography
 from standoff.core.homography import FloatArray
 from standoff.core.pose import View
 from standoff.core.types import CameraMotion
-from standoff.stages.ground.compiled import compiled
+from standoff.core.compiled import compiled
 from standoff.stages.ground.projection import on_ground, projected, turned_by
 from standoff.stages.ground.solid import STATE
 

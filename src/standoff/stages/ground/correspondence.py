@@ -11,7 +11,7 @@ import numpy as np
 
 from standoff.core.camera import Camera
 from standoff.core.homography import FloatArray
-from standoff.stages.ground.compiled import compiled
+from standoff.core.compiled import compiled
 from standoff.stages.ground.quadrilateral import ORDERS
 from standoff.stages.ground.shape import ReferenceShape
 

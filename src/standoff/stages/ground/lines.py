@@ -11,7 +11,7 @@ import numpy as np
 
 from standoff.core.homography import FloatArray
 from standoff.core.types import IntArray
-from standoff.stages.ground.compiled import compiled
+from standoff.core.compiled import compiled
 
 CONTOURS = 4
 

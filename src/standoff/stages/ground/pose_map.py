@@ -7,7 +7,7 @@ import numpy as np
 from standoff.core.homography import FloatArray, invert, point_jacobian
 from standoff.core.pose import CHANGES, View
 from standoff.core.types import GroundMap
-from standoff.stages.ground.compiled import compiled
+from standoff.core.compiled import compiled
 from standoff.stages.ground.projection import eye_of, on_ground, projected
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from standoff.core.homography import FloatArray
 from standoff.core.pose import CHANGES, View
-from standoff.stages.ground.compiled import compiled
+from standoff.core.compiled import compiled
 
 
 _UNDISTORT_ITERATIONS, _UNDISTORT_TOLERANCE, _UNDISTORTED = 50, 1e-12, 1e-9

@@ -12,7 +12,7 @@ import numpy as np
 
 from standoff.core.homography import FloatArray
 from standoff.core.types import IntArray, NoGroundMap
-from standoff.stages.ground.compiled import compiled
+from standoff.core.compiled import compiled
 
 NO_QUADRILATERAL = "the contours make no convex quadrilateral"
 OUTSIDE_BOX = "a corner lies outside the reference's box"

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import Luma
-from standoff.stages.ground.compiled import compiled
+from standoff.core.compiled import compiled
 from standoff.stages.ground.edges import interpolated
 from standoff.stages.ground.solid import EdgeSamples
 

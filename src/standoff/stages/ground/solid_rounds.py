@@ -10,7 +10,7 @@ import numpy as np
 
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import IntArray
-from standoff.stages.ground.compiled import compiled
+from standoff.core.compiled import compiled
 from standoff.stages.ground.lines import TUKEY
 from standoff.stages.ground.projection import projected
 

@@ -14,7 +14,8 @@ from standoff.stages.motion.lens import Lens
 from standoff.stages.motion.movers import inside
 from standoff.stages.motion.params import MotionParams
 from standoff.stages.motion.picture import FollowedPicture
-from standoff.stages.motion.plane import MIN_PAIRS, PlaneMotion, fit_plane
+from standoff.stages.motion.plane import PlaneMotion, fit_plane
+from standoff.stages.motion.plane_rounds import MIN_PAIRS
 
 _MORE = 4
 _TRUST_STEP = 0.25
