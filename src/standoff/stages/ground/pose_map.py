@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from standoff.core.compiled import compiled
 from standoff.core.homography import FloatArray, invert, point_jacobian
 from standoff.core.pose import CHANGES, View
 from standoff.core.types import GroundMap
-from standoff.core.compiled import compiled
 from standoff.stages.ground.projection import eye_of, on_ground, projected
 
 
@@ -36,7 +36,7 @@ def map_from_view(
         middle_m: (2,) the place that such an error leaves where it is; None: the origin.
         site_frame: Which of the stream's site frames the metres are of.
     """
-    matrix, by_view = _entries_with_jacobian(view)
+    matrix, by_view = _entries_with_jacobian(view.plane_to_pinhole(), view.site_to_camera, view.camera.matrix)
     total = by_view @ covariance @ by_view.T
     if size_sigma > 0:
         middle = np.zeros(2) if middle_m is None else middle_m
@@ -57,38 +57,39 @@ def map_from_view(
     )
 
 
-_TURNS = np.array(
-    [
-        [[0.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]],
-        [[0.0, 0.0, 1.0], [0.0, 0.0, 0.0], [-1.0, 0.0, 0.0]],
-        [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]],
-    ]
-)
-"""(3, 3, 3) what turns about the camera's axes do to a point of its frame, a radian each: axis x point."""
-
-
-def _entries_with_jacobian(view: View) -> tuple[FloatArray, FloatArray]:
+@compiled
+def _entries_with_jacobian(forth: FloatArray, rotation: FloatArray, camera: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the signed map from undistorted pixels to the ground, at unit norm, and its derivative by the view.
+
+    Args:
+        forth: (3, 3) from the ground to undistorted pixels.
+        rotation: (3, 3) of the view.
+        camera: (3, 3) its camera matrix.
 
     Returns:
         (3, 3), and (10, 8) of its entries and of the lens's k1.
     """
-    forth = view.plane_to_pinhole()
-    back = invert(forth)
-    camera = view.camera.matrix
-    to_camera = np.linalg.solve(camera, forth)
+    back = np.linalg.inv(forth)
+    to_camera = np.linalg.inv(camera) @ forth
     by_forth = np.zeros((CHANGES, 3, 3))
-    by_forth[:3] = camera @ (_TURNS @ to_camera)
-    by_forth[3:6, :, 2] = -(camera @ view.site_to_camera).T
-    by_forth[6, :2] = np.diag(camera)[:2, None] * to_camera[:2]
-    # The inverse moves by -back d(forth) back; of that only what is across the entries' own direction keeps the norm.
-    slopes = -(back @ by_forth @ back).reshape(CHANGES, 9)
-    norm = float(np.linalg.norm(back))
-    entries = (back / norm).ravel()
+    for k in range(3):
+        # A turn of a radian about axis k takes a point of the camera's frame to axis x point.
+        turn = np.zeros((3, 3))
+        turn[(k + 1) % 3, (k + 2) % 3], turn[(k + 2) % 3, (k + 1) % 3] = -1.0, 1.0
+        by_forth[k] = camera @ turn @ to_camera
+        by_forth[3 + k, :, 2] = -(camera @ rotation)[:, k]
+    for axis in range(2):
+        by_forth[6, axis] = camera[axis, axis] * to_camera[axis]
+    norm = np.sqrt((back**2).sum())
+    entries = back / norm
     by_view = np.zeros((10, CHANGES))
-    by_view[:9] = (slopes - np.outer(slopes @ entries, entries)).T / norm
+    for k in range(CHANGES):
+        # The inverse moves by -back d(forth) back; of that only what is across the entries' own direction keeps the
+        # norm.
+        slope = -(back @ by_forth[k] @ back) / norm
+        by_view[:9, k] = (slope - (slope * entries).sum() * entries).reshape(-1)
     by_view[9, 7] = 1.0
-    return entries.reshape(3, 3), by_view
+    return entries, by_view
 
 
 _AT = np.array([[0.45, 0.6], [0.55, 0.6], [0.5, 0.52], [0.5, 0.68]])

@@ -83,10 +83,12 @@ def side_support(support: FloatArray, lower_side: IntArray, count: int) -> Float
         lower_side: (E,) the side whose lower edge each is, or -1.
         count: Sides of the outline, whose upper edges come first.
     """
-    upper = np.nan_to_num(support[:count], nan=0.0)
-    lower = np.flatnonzero(lower_side >= 0)
-    np.maximum.at(upper, lower_side[lower], np.nan_to_num(support[lower], nan=0.0))
-    return upper
+    best = np.zeros(count)
+    for edge, share in enumerate(support.tolist()):
+        side = edge if edge < count else lower_side[edge]
+        if side >= 0 and share > best[side]:
+            best[side] = share
+    return best
 
 
 def fit_solid(

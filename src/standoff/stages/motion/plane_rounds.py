@@ -45,6 +45,30 @@ _SECOND_SHARE = 0.2
 
 
 @compiled
+def expect_points(points: FloatArray, pose: FloatArray, back: FloatArray, ratio: float) -> FloatArray:
+    """Return (N, 2) where points are after a motion, moved on by a share of the last step.
+
+    Args:
+        points: (N, 2).
+        pose: (3, 3) the motion, signed.
+        back: (3, 3) from where it takes them to where they were a step before.
+        ratio: How many times that step; none where there is no place a step before. NaN beyond the horizon.
+    """
+    expected = np.full((len(points), 2), np.nan)
+    for n in range(len(points)):
+        x, y, w = pose @ np.array([points[n, 0], points[n, 1], 1.0])
+        if not w > 0.0:
+            continue
+        x, y = x / w, y / w
+        expected[n, 0], expected[n, 1] = x, y
+        before_x, before_y, before_w = back @ np.array([x, y, 1.0])
+        if before_w > 0.0:
+            expected[n, 0] += ratio * (x - before_x / before_w)
+            expected[n, 1] += ratio * (y - before_y / before_w)
+    return expected
+
+
+@compiled
 def refine(
     source: FloatArray, target: FloatArray, start: FloatArray, reach_px: float, inlier_px: float, followed_px: float
 ) -> tuple[bool, FloatArray, FloatArray, FloatArray, BoolArray]:
