@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from standoff.core import homography
+from standoff.core.compiled import compiled, solved
 from standoff.core.homography import FloatArray
-from standoff.core.pose import View
+from standoff.core.pose import POSE, View
 from standoff.core.types import CameraMotion
-from standoff.core.compiled import compiled
 from standoff.stages.ground.projection import on_ground, projected, turned_by
 from standoff.stages.ground.solid import STATE
 
@@ -73,16 +73,19 @@ def carry(key: View, motion: CameraMotion, guess: View) -> Carried | None:
     if len(seen_px) < _MIN_POINTS:
         return None
     lens = camera.matrix, distortion
-    try:
-        position_m, rotation, rms_px = _follow(places, moved_px, guess.position_m, guess.site_to_camera, *lens)
-        if not rms_px < _MAX_MISFIT_PX:
-            return None
-        by_key, added = _errors(
-            seen_px, places, moved_px, motion.keyframe_to_image, motion.covariance, position_m, rotation, rms_px,
-            lens_known, *then,
-        )
-    except np.linalg.LinAlgError:
+    position_m, rotation, rms_px = _follow(places, moved_px, guess.position_m, guess.site_to_camera, *lens)
+    if not rms_px < _MAX_MISFIT_PX:
         return None
+    variance, by_state, by_entries = _derivatives(
+        seen_px, places, moved_px, motion.keyframe_to_image, position_m, rotation, *then
+    )
+    if lens_known:
+        by_state[:, 7] = 0.0
+    by_key, added = np.eye(STATE), np.zeros((STATE, STATE))
+    by_key[POSE, :8] = -by_state
+    # The misfit is smooth over the picture: its eight degrees of freedom count, not the number of points.
+    misfit = rms_px**2 * (len(seen_px) / 4.0) * variance
+    added[POSE, POSE] = by_entries @ motion.covariance @ by_entries.T + misfit
     return Carried(View(camera, position_m, rotation), by_key, added)
 
 
@@ -106,12 +109,20 @@ def _ground_moved(
     found = 0
     for n in range(len(grid_px)):
         away_m = np.sqrt((xy_m[n, 0] - position_m[0]) ** 2 + (xy_m[n, 1] - position_m[1]) ** 2)
-        x, y, w = keyframe_to_image @ np.array([grid_px[n, 0], grid_px[n, 1], 1.0])
+        w = _row(keyframe_to_image, 2, grid_px[n])
         if away_m < _FAR_HEIGHTS * abs(position_m[2]) and w > 0.0:
-            seen_px[found], places[found, :2] = grid_px[n], xy_m[n]
-            moved_px[found, 0], moved_px[found, 1] = x / w, y / w
+            for axis in range(2):
+                seen_px[found, axis], places[found, axis] = grid_px[n, axis], xy_m[n, axis]
+                moved_px[found, axis] = _row(keyframe_to_image, axis, grid_px[n]) / w
             found += 1
     return seen_px[:found], places[:found], moved_px[:found]
+
+
+@compiled
+def _row(matrix: FloatArray, row: int, point: FloatArray) -> float:
+    """Return what one row of a homography makes of a point (2,)."""
+    value: float = matrix[row, 0] * point[0] + matrix[row, 1] * point[1] + matrix[row, 2]
+    return value
 
 
 @compiled
@@ -128,61 +139,79 @@ def _follow(
     And how far off they are, root mean square; NaN where they are behind the camera.
     """
     position_m, rotation = position_m.copy(), rotation.copy()
+    pull = np.empty((6, 1))
     for _ in range(_ROUNDS):
         points_px, by_view, _ = projected(places, position_m, rotation, matrix, distortion)
-        misfit = (moved_px - points_px).reshape(-1)
-        by_pose = np.ascontiguousarray(by_view.reshape(-1, 8)[:, :6])
-        if not np.isfinite(misfit).all():
-            return position_m, rotation, np.nan
-        change = np.linalg.solve(by_pose.T @ by_pose, by_pose.T @ misfit)
-        position_m, rotation = position_m + change[3:6], turned_by(change[:3], rotation)
-        if np.abs(change).max() < _STILL:
+        pull[:] = 0.0
+        for n in range(len(places)):
+            for axis in range(2):
+                for k in range(6):
+                    pull[k, 0] += by_view[n, axis, k] * (moved_px[n, axis] - points_px[n, axis])
+        change = solved(_by_pose_squared(by_view), pull)
+        largest = 0.0
+        for k in range(6):
+            largest = max(largest, abs(change[k, 0]))
+        rotation = turned_by(change[:3, 0], rotation)
+        for axis in range(3):
+            position_m[axis] += change[3 + axis, 0]
+        if largest < _STILL:
             break
-    misfit = moved_px - projected(places, position_m, rotation, matrix, distortion)[0]
-    return position_m, rotation, np.sqrt((misfit**2).mean())
+    points_px, _, _ = projected(places, position_m, rotation, matrix, distortion)
+    squares = 0.0
+    for n in range(len(places)):
+        squares += (moved_px[n, 0] - points_px[n, 0]) ** 2 + (moved_px[n, 1] - points_px[n, 1]) ** 2
+    return position_m, rotation, np.sqrt(squares / (2 * len(places)))
 
 
 @compiled
-def _errors(
+def _by_pose_squared(by_view: FloatArray) -> FloatArray:
+    """Return (6, 6) the derivative by the pose, squared and summed over all points."""
+    squared = np.zeros((6, 6))
+    for n in range(len(by_view)):
+        for axis in range(2):
+            for i in range(6):
+                for k in range(6):
+                    squared[i, k] += by_view[n, axis, i] * by_view[n, axis, k]
+    return squared
+
+
+@compiled
+def _derivatives(
     seen_px: FloatArray,
     places: FloatArray,
     moved_px: FloatArray,
     keyframe_to_image: FloatArray,
-    motion_covariance: FloatArray,
     position_m: FloatArray,
     rotation: FloatArray,
-    rms_px: float,
-    lens_known: bool,
     then_position_m: FloatArray,
     then_rotation: FloatArray,
     matrix: FloatArray,
     distortion: FloatArray,
-) -> tuple[FloatArray, FloatArray]:
-    """Return (9, 9) `Carried.by_key` and (9, 9) `Carried.added`.
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return what moves the pose that follows the points.
 
-    The points of the ground move with the keyframe's state, and the view now follows them. The pose takes its share of
-    the motion's error, and of what no pose explains of the motion.
+    Returns:
+        (6, 6) its covariance for points of unit variance; (6, 8) what a change of the keyframe's view, by which the
+        places of the points move, asks of it; (6, 9) its derivative by the motion's entries.
     """
-    count = len(places)
     _, by_view, by_point = projected(places, position_m, rotation, matrix, distortion)
     _, then_by_view, then_by_point = projected(places, then_position_m, then_rotation, matrix, distortion)
-    by_pose = np.ascontiguousarray(by_view.reshape(-1, 8)[:, :6])
-    image_by_key, by_entries = np.empty((count, 2, 8)), np.zeros((count, 2, 9))
-    for n in range(count):
-        ground_by_key = -np.linalg.solve(np.ascontiguousarray(then_by_point[n, :, :2]), then_by_view[n])
-        image_by_key[n] = np.ascontiguousarray(by_point[n, :, :2]) @ ground_by_key
-        image_by_key[n, :, 6:] += by_view[n, :, 6:]
-        over_w = np.array([seen_px[n, 0], seen_px[n, 1], 1.0])
-        over_w /= (keyframe_to_image[2] * over_w).sum()
-        by_entries[n, 0, :3] = by_entries[n, 1, 3:6] = over_w
-        by_entries[n, 0, 6:], by_entries[n, 1, 6:] = -moved_px[n, 0] * over_w, -moved_px[n, 1] * over_w
-    if lens_known:
-        image_by_key[:, :, 7] = 0.0
-    variance = np.linalg.inv(by_pose.T @ by_pose)
-    solve = variance @ by_pose.T
-    to_pose = solve @ by_entries.reshape(-1, 9)
-    by_key, added = np.eye(STATE), np.zeros((STATE, STATE))
-    by_key[:6, :8] = -solve @ image_by_key.reshape(-1, 8)
-    # The misfit is smooth over the picture: its eight degrees of freedom count, not the number of points.
-    added[:6, :6] = to_pose @ motion_covariance @ to_pose.T + rms_px**2 * (count / 4.0) * variance
-    return by_key, added
+    by_state, by_entries, unit = np.zeros((6, 8)), np.zeros((6, 9)), np.eye(6)
+    for n in range(len(places)):
+        a, b, c, d = then_by_point[n, 0, 0], then_by_point[n, 0, 1], then_by_point[n, 1, 0], then_by_point[n, 1, 1]
+        w = _row(keyframe_to_image, 2, seen_px[n])
+        for axis in range(2):
+            # By the pixel in the keyframe: a change of the view there moves the place that it shows.
+            first = (by_point[n, axis, 0] * d - by_point[n, axis, 1] * c) / (a * d - b * c)
+            second = (by_point[n, axis, 1] * a - by_point[n, axis, 0] * b) / (a * d - b * c)
+            for i in range(6):
+                share = by_view[n, axis, i]
+                for k in range(8):
+                    moves = -first * then_by_view[n, 0, k] - second * then_by_view[n, 1, k]
+                    by_state[i, k] += share * (moves + (by_view[n, axis, k] if k >= 6 else 0.0))
+                for k in range(3):
+                    over_w = (seen_px[n, k] if k < 2 else 1.0) / w
+                    by_entries[i, 3 * axis + k] += share * over_w
+                    by_entries[i, 6 + k] -= share * moved_px[n, axis] * over_w
+    squared = _by_pose_squared(by_view)
+    return solved(squared, unit), solved(squared, by_state), solved(squared, by_entries)

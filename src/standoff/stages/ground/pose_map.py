@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from standoff.core.compiled import compiled
+from standoff.core.compiled import compiled, solved
 from standoff.core.homography import FloatArray, invert, point_jacobian
 from standoff.core.pose import CHANGES, View
 from standoff.core.types import GroundMap
@@ -69,27 +69,45 @@ def _entries_with_jacobian(forth: FloatArray, rotation: FloatArray, camera: Floa
     Returns:
         (3, 3), and (10, 8) of its entries and of the lens's k1.
     """
-    back = np.linalg.inv(forth)
-    to_camera = np.linalg.inv(camera) @ forth
-    by_forth = np.zeros((CHANGES, 3, 3))
-    for k in range(3):
-        # A turn of a radian about axis k takes a point of the camera's frame to axis x point.
-        turn = np.zeros((3, 3))
-        turn[(k + 1) % 3, (k + 2) % 3], turn[(k + 2) % 3, (k + 1) % 3] = -1.0, 1.0
-        by_forth[k] = camera @ turn @ to_camera
-        by_forth[3 + k, :, 2] = -(camera @ rotation)[:, k]
-    for axis in range(2):
-        by_forth[6, axis] = camera[axis, axis] * to_camera[axis]
+    back, to_camera = solved(forth, np.eye(3)), solved(camera, forth)
     norm = np.sqrt((back**2).sum())
-    entries = back / norm
-    by_view = np.zeros((10, CHANGES))
-    for k in range(CHANGES):
+    entries, by_view = back / norm, np.zeros((10, CHANGES))
+    by_forth, slope = np.zeros((3, 3)), np.empty((3, 3))
+    for change in range(CHANGES - 1):
+        _forth_by(change, to_camera, rotation, camera, by_forth)
         # The inverse moves by -back d(forth) back; of that only what is across the entries' own direction keeps the
         # norm.
-        slope = -(back @ by_forth[k] @ back) / norm
-        by_view[:9, k] = (slope - (slope * entries).sum() * entries).reshape(-1)
+        along = 0.0
+        for i in range(3):
+            for j in range(3):
+                slope[i, j] = 0.0
+                for k in range(3):
+                    for m in range(3):
+                        slope[i, j] -= back[i, k] * by_forth[k, m] * back[m, j] / norm
+                along += slope[i, j] * entries[i, j]
+        for entry in range(9):
+            by_view[entry, change] = slope[entry // 3, entry % 3] - along * entries[entry // 3, entry % 3]
     by_view[9, 7] = 1.0
     return entries, by_view
+
+
+@compiled
+def _forth_by(
+    change: int, to_camera: FloatArray, rotation: FloatArray, camera: FloatArray, by_forth: FloatArray
+) -> None:
+    """Fill in (3, 3) the derivative of the map to pixels by one parameter of a change of the view, all but k1."""
+    by_forth[:] = 0.0
+    for row in range(3):
+        for column in range(3):
+            if change < 3:
+                # A turn of a radian about an axis takes a point of the camera's frame to axis x point.
+                after, before = (change + 1) % 3, (change + 2) % 3
+                by_forth[row, column] = camera[row, before] * to_camera[after, column]
+                by_forth[row, column] -= camera[row, after] * to_camera[before, column]
+            elif change < 6:
+                by_forth[row, 2] -= camera[row, column] * rotation[column, change - 3]
+            elif row < 2:
+                by_forth[row, column] = camera[row, row] * to_camera[row, column]
 
 
 _AT = np.array([[0.45, 0.6], [0.55, 0.6], [0.5, 0.52], [0.5, 0.68]])
@@ -120,20 +138,29 @@ def _length_sigma(
     distortion: FloatArray,
     first_fold_r2: float,
 ) -> float:
+    xy_m = on_ground(at_px, position_m, rotation, matrix, distortion, first_fold_r2)
     points_m = np.zeros((len(at_px), 3))
-    points_m[:, :2] = on_ground(at_px, position_m, rotation, matrix, distortion, first_fold_r2)
-    if not np.isfinite(points_m).all():
-        return np.inf
+    for n in range(len(at_px)):
+        points_m[n, 0], points_m[n, 1] = xy_m[n, 0], xy_m[n, 1]
+        if not (np.isfinite(xy_m[n, 0]) and np.isfinite(xy_m[n, 1])):
+            return np.inf
     _, by_view, by_point = projected(points_m, position_m, rotation, matrix, distortion)
-    worst = 0.0
+    worst, longer = 0.0, np.empty(CHANGES)
     for start in (0, 2):
-        apart_m = points_m[start + 1, :2] - points_m[start, :2]
-        longer = np.zeros(CHANGES)
+        x, y = points_m[start + 1, 0] - points_m[start, 0], points_m[start + 1, 1] - points_m[start, 1]
+        longer[:] = 0.0
         for at, sign in ((start, 1.0), (start + 1, -1.0)):
             # A pixel stays where it is, so its place on the ground moves.
-            moves = np.linalg.solve(np.ascontiguousarray(by_point[at, :, :2]), by_view[at])
-            longer += sign * (apart_m[0] * moves[0] + apart_m[1] * moves[1]) / (apart_m**2).sum()
-        worst = max(worst, (longer * (covariance @ longer)).sum())
+            a, b, c, d = by_point[at, 0, 0], by_point[at, 0, 1], by_point[at, 1, 0], by_point[at, 1, 1]
+            share = sign / ((a * d - b * c) * (x * x + y * y))
+            for k in range(CHANGES):
+                first, second = by_view[at, 0, k], by_view[at, 1, k]
+                longer[k] += share * (x * (d * first - b * second) + y * (a * second - c * first))
+        variance = 0.0
+        for i in range(CHANGES):
+            for k in range(CHANGES):
+                variance += longer[i] * covariance[i, k] * longer[k]
+        worst = max(worst, variance)
     return np.sqrt(worst)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import IntArray
-from standoff.core.compiled import compiled
+from standoff.core.compiled import compiled, solved
 from standoff.stages.ground.lines import TUKEY
 from standoff.stages.ground.projection import projected
 
@@ -58,20 +58,24 @@ def find_change(
     Returns:
         Both NaN where there is too little to fit to.
     """
-    nothing = np.full(len(most), np.nan), np.nan
+    size = len(most)
+    change, furthest_px = np.full(size, np.nan), 0.0
     weight, scatter_px = weigh(residual, found, inside, edge, doubt_px)
-    if (weight > 0.0).sum() < _MIN_SAMPLES:
-        return nothing
+    believed = 0
+    for n in range(len(weight)):
+        believed += weight[n] > 0.0
+    if believed < _MIN_SAMPLES:
+        return change, np.nan
     information, pull = normal_equations(jacobian, residual, weight, scatter_px, edge, doubt_px)
-    change = np.linalg.solve(information + prior_information, pull + prior_pull)
-    if not np.isfinite(change).all():
-        return nothing
-    change = np.minimum(np.maximum(change, -most), most)
-    furthest_px = 0.0
+    step = solved(information + prior_information, (pull + prior_pull).reshape(-1, 1))
+    for k in range(size):
+        if not np.isfinite(step[k, 0]):
+            return change, np.nan
+        change[k] = min(max(step[k, 0], -most[k]), most[k])
     for n in range(len(weight)):
         if weight[n] > 0.0:
             moved_px = 0.0
-            for k in range(len(change)):
+            for k in range(size):
                 moved_px += jacobian[n, k] * change[k]
             furthest_px = max(furthest_px, abs(moved_px))
     return change, furthest_px
@@ -101,8 +105,8 @@ def associate(
         there is one; (N, 9) how the state's edge moves along the normal.
     """
     places = np.empty((len(z_share), 3))
-    places[:, :2] = xy_m
-    places[:, 2] = z_share * height_m
+    for n in range(len(z_share)):
+        places[n, 0], places[n, 1], places[n, 2] = xy_m[n, 0], xy_m[n, 1], z_share[n] * height_m
     points_px, by_view, by_point = projected(places, position_m, rotation, matrix, distortion)
     moved_px, jacobian = expect_edges(points_px, by_view, by_point, samples_px, normal, z_share)
     residual, found = choose_edges(moved_px, edge, count, offset_px, steepness, gate_px)

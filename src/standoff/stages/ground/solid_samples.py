@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from standoff.core.homography import BoolArray, FloatArray
+from standoff.core.homography import FloatArray
 from standoff.core.types import IntArray
 from standoff.core.compiled import compiled
 from standoff.stages.ground.projection import seen
@@ -47,22 +47,30 @@ def find_visible(
     edges, doubt_px = np.empty((3 * count, 2, 3)), np.zeros(3 * count)
     lower_side = np.full(3 * count, -1)
     for k in range(count):
-        edges[k, 0, :2], edges[k, 1, :2] = corners[k], corners[(k + 1) % count]
-        edges[k, :, 2] = 0.5 if narrow[k] else 1.0
-        doubt_px[k] = strip_px[k] / 2.0 if narrow[k] else 0.0
+        level = 0.5 if narrow[k] else 1.0
+        _put_edge(edges, k, corners, k, level, (k + 1) % count, level)
+        if narrow[k]:
+            doubt_px[k] = strip_px[k] / 2.0
     found = count
     for k in range(count):
         if faces[k] and not narrow[k]:
-            edges[found, 0, :2], edges[found, 1, :2] = corners[k], corners[(k + 1) % count]
-            edges[found, :, 2] = 0.0
+            _put_edge(edges, found, corners, k, 0.0, (k + 1) % count, 0.0)
             lower_side[found] = k
             found += 1
     for k in range(count):
         if faces[k] or faces[k - 1]:
-            edges[found, 0, :2], edges[found, 1, :2] = corners[k], corners[k]
-            edges[found, 0, 2], edges[found, 1, 2] = 1.0, 0.0
+            _put_edge(edges, found, corners, k, 1.0, k, 0.0)
             found += 1
     return edges[:found], doubt_px[:found], lower_side[:found]
+
+
+@compiled
+def _put_edge(
+    edges: FloatArray, at: int, corners: FloatArray, start: int, start_share: float, end: int, end_share: float
+) -> None:
+    for axis in range(2):
+        edges[at, 0, axis], edges[at, 1, axis] = corners[start, axis], corners[end, axis]
+    edges[at, 0, 2], edges[at, 1, 2] = start_share, end_share
 
 
 @compiled
@@ -79,15 +87,17 @@ def _strip_widths(
     count = len(corners)
     places = np.empty((3 * count, 3))
     for k in range(count):
-        places[k, :2] = corners[k]
-        places[count + k, :2] = places[2 * count + k, :2] = (corners[k] + corners[(k + 1) % count]) / 2.0
-        places[k, 2] = places[count + k, 2] = height_m
-        places[2 * count + k, 2] = 0.0
+        for axis in range(2):
+            middle = (corners[k, axis] + corners[(k + 1) % count, axis]) / 2.0
+            places[k, axis], places[count + k, axis], places[2 * count + k, axis] = corners[k, axis], middle, middle
+        places[k, 2], places[count + k, 2], places[2 * count + k, 2] = height_m, height_m, 0.0
     pixels = seen(places, position_m, rotation, matrix, distortion, first_fold_r2)
     widths = np.empty(count)
     for k in range(count):
-        along, drop = pixels[(k + 1) % count] - pixels[k], pixels[count + k] - pixels[2 * count + k]
-        widths[k] = abs(drop[1] * along[0] - drop[0] * along[1]) / np.sqrt(along[0] ** 2 + along[1] ** 2)
+        after, high, low = (k + 1) % count, count + k, 2 * count + k
+        along_x, along_y = pixels[after, 0] - pixels[k, 0], pixels[after, 1] - pixels[k, 1]
+        drop_x, drop_y = pixels[high, 0] - pixels[low, 0], pixels[high, 1] - pixels[low, 1]
+        widths[k] = abs(drop_y * along_x - drop_x * along_y) / np.sqrt(along_x**2 + along_y**2)
     return widths
 
 
@@ -107,52 +117,56 @@ def put_samples(
     edges, doubt_px, lower_side = find_visible(
         corners, height_m, position_m, rotation, matrix, distortion, first_fold_r2
     )
-    ends_m = edges.copy().reshape(-1, 3)
-    ends_m[:, 2] *= height_m
-    ends_px = seen(ends_m, position_m, rotation, matrix, distortion, first_fold_r2).reshape(-1, 2, 2)
     count = len(edges)
+    ends_m = np.empty((2 * count, 3))
+    for k in range(2 * count):
+        ends_m[k, 0], ends_m[k, 1] = edges[k // 2, k % 2, 0], edges[k // 2, k % 2, 1]
+        ends_m[k, 2] = edges[k // 2, k % 2, 2] * height_m
+    ends_px = seen(ends_m, position_m, rotation, matrix, distortion, first_fold_r2)
     normal, length_px = np.empty((count, 2)), np.empty(count)
     counts = np.zeros(count, dtype=np.int64)
+    samples = 0
     for k in range(count):
-        x, y = ends_px[k, 1, 0] - ends_px[k, 0, 0], ends_px[k, 1, 1] - ends_px[k, 0, 1]
+        x, y = ends_px[2 * k + 1, 0] - ends_px[2 * k, 0], ends_px[2 * k + 1, 1] - ends_px[2 * k, 1]
         length_px[k] = np.sqrt(x * x + y * y)
         normal[k, 0], normal[k, 1] = -y / length_px[k], x / length_px[k]
         if np.isfinite(length_px[k]) and length_px[k] >= _MIN_LENGTH_PX:
             counts[k] = int(max((length_px[k] - 2.0 * _TRIM_PX) / _STEP_PX, 3.0))
-    free_px = _free_reach(ends_px, normal, length_px, edges[:, 0, 2] == edges[:, 1, 2])
-    samples = counts.sum()
-    places, edge = np.empty((samples, 3)), np.empty(samples, dtype=np.int64)
-    across, reach_px = np.empty((samples, 2)), np.empty(samples)
+        samples += counts[k]
+    free_px = _free_reach(ends_px, normal, length_px, edges)
+    xy_m, z_share, edge = np.empty((samples, 2)), np.empty(samples), np.empty(samples, dtype=np.int64)
+    places, across, reach_px = np.empty((samples, 3)), np.empty((samples, 2)), np.empty(samples)
     n = 0
     for k in range(count):
         trim = _TRIM_PX / length_px[k]
         for within in range(counts[k]):
             share = trim + (1.0 - 2.0 * trim) * (within + 0.5) / counts[k]
-            places[n] = edges[k, 0] + share * (edges[k, 1] - edges[k, 0])
-            edge[n], across[n], reach_px[n] = k, normal[k], free_px[k]
+            for axis in range(2):
+                xy_m[n, axis] = edges[k, 0, axis] + share * (edges[k, 1, axis] - edges[k, 0, axis])
+                places[n, axis], across[n, axis] = xy_m[n, axis], normal[k, axis]
+            z_share[n] = edges[k, 0, 2] + share * (edges[k, 1, 2] - edges[k, 0, 2])
+            places[n, 2], edge[n], reach_px[n] = z_share[n] * height_m, k, free_px[k]
             n += 1
         if counts[k] == 0:
             length_px[k] = 0.0
-    xy_m, z_share = places[:, :2].copy(), places[:, 2].copy()
-    places[:, 2] *= height_m
     points_px = seen(places, position_m, rotation, matrix, distortion, first_fold_r2)
     return xy_m, z_share, edge, points_px, across, reach_px, length_px, doubt_px, lower_side
 
 
 @compiled
-def _free_reach(ends_px: FloatArray, normal: FloatArray, length_px: FloatArray, level: BoolArray) -> FloatArray:
+def _free_reach(ends_px: FloatArray, normal: FloatArray, length_px: FloatArray, edges: FloatArray) -> FloatArray:
     """Return (E,) half the distance from each edge to the nearest level one beside it, in px; inf if there is none.
 
     Upright edges are too short to hem in others, and edges that follow each other in one line do not hem each other in.
     """
-    count = len(ends_px)
+    count = len(edges)
     reach = np.full(count, np.inf)
     for k in range(count):
         for other in range(count):
-            if other == k or not level[other]:
+            if other == k or edges[other, 0, 2] != edges[other, 1, 2]:
                 continue
-            x = (ends_px[other, 0, 0] + ends_px[other, 1, 0] - ends_px[k, 0, 0] - ends_px[k, 1, 0]) / 2.0
-            y = (ends_px[other, 0, 1] + ends_px[other, 1, 1] - ends_px[k, 0, 1] - ends_px[k, 1, 1]) / 2.0
+            x = (ends_px[2 * other, 0] + ends_px[2 * other + 1, 0] - ends_px[2 * k, 0] - ends_px[2 * k + 1, 0]) / 2.0
+            y = (ends_px[2 * other, 1] + ends_px[2 * other + 1, 1] - ends_px[2 * k, 1] - ends_px[2 * k + 1, 1]) / 2.0
             parallel = abs(normal[k, 0] * normal[other, 0] + normal[k, 1] * normal[other, 1]) > _PARALLEL_COSINE
             lengthwise = abs(x * normal[k, 1] - y * normal[k, 0])
             if parallel and lengthwise < _OVERLAP * (length_px[k] + length_px[other]) / 2.0:

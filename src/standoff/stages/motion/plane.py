@@ -7,12 +7,26 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from standoff.core import homography
 from standoff.core.homography import BoolArray, FloatArray
-from standoff.stages.motion.plane_rounds import MIN_PAIRS, refine, relief_of
+from standoff.stages.motion.plane_rounds import MIN_PAIRS, refine
 
 _RANSAC_ROUNDS = 300
 _RANSAC_CONFIDENCE = 0.995
 _CLOSELY, _MAJORITY = 1.0 / 3.0, 0.5
+
+_RELIEF_SHARE = 0.68
+_RELIEF_REACH = 2.5
+"""Points further off than so many times the reach of the nearer two thirds do not count as relief."""
+
+_RELIEF_PART = 0.5
+"""Share of the points' variance in height that the plane as a whole may be off by; chosen on the simulated clips."""
+
+_NOISE_MARGIN = 1.2
+"""Times the noise's variance: neither it nor the residuals' is known better from a hundred points."""
+
+_SECOND_SHARE = 0.2
+"""Share of the points from which a second motion that they share makes the first one doubtful."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,11 +70,21 @@ def fit_plane(
     start, reach_px = _consensus(source[voters], target[voters], inlier_px)
     if start is None:
         return None
-    try:
-        agree, *refined = refine(source, target, start, reach_px, inlier_px, followed_px)
-    except np.linalg.LinAlgError:
+    by_source, by_target = homography.normalisation(source), homography.normalisation(target)
+    unit, back = by_target[0, 0], np.linalg.inv(by_target)
+    places, wanted = (np.diag(one)[:2] * points + one[:2, 2] for one, points in ((by_source, source), (by_target, target)))
+    begun = by_target @ start @ np.linalg.inv(by_source)
+    lengths = reach_px * unit, inlier_px * unit, followed_px * unit
+    agree, matrix, parameters, residual, inlier = refine(places, wanted, begun / begun[2, 2], *lengths)
+    if not (agree and np.isfinite(parameters).all()):
         return None
-    return PlaneMotion(*refined) if agree else None
+    matrix, covariance = back @ matrix @ by_source, np.zeros((9, 9))
+    covariance[:8, :8] = parameters
+    signed = homography.signed(matrix, source[inlier].mean(axis=0))
+    # The entry (i, l) in pixels is back[i, j] by_source[k, l] of the entry (j, k).
+    in_pixels = back[:, None, :, None] * by_source.T[None, :, None, :]
+    linear = float(signed.ravel() @ matrix.ravel()) / float((matrix**2).sum()) * in_pixels.reshape(9, 9)
+    return PlaneMotion(signed, linear @ covariance @ linear.T, residual / unit, inlier)
 
 
 def relief_covariance(plane: PlaneMotion, noise_px: float) -> FloatArray:
@@ -75,7 +99,34 @@ def relief_covariance(plane: PlaneMotion, noise_px: float) -> FloatArray:
         plane: As fitted.
         noise_px: Standard error, along an axis, that following alone gives a point.
     """
-    return relief_of(plane.matrix, plane.residual_px, plane.inlier, noise_px)
+    length = np.hypot(plane.residual_px[:, 0], plane.residual_px[:, 1])
+    near = plane.residual_px[length <= _RELIEF_REACH * np.quantile(length, _RELIEF_SHARE)]
+    excess, axes = np.linalg.eigh(near.T @ near / max(len(near), 1) - _NOISE_MARGIN * noise_px**2 * np.eye(2))
+    shift = _RELIEF_PART * (axes * np.maximum(excess, 0.0)) @ axes.T + _second_shift(plane)
+    by_shift = np.zeros((9, 2))
+    by_shift[0:3, 0] = by_shift[3:6, 1] = plane.matrix[2]
+    covariance: FloatArray = by_shift @ shift @ by_shift.T
+    return covariance
+
+
+def _second_shift(plane: PlaneMotion) -> FloatArray:
+    """Return (2, 2) the spread of a mixture of the plane and of a second motion, weighted by their points.
+
+    As a shift: a homography of few points close together says nothing of the rest of the picture.
+    """
+    others = ~plane.inlier
+    inliers = int(np.count_nonzero(plane.inlier))
+    least = max(_SECOND_SHARE * inliers, MIN_PAIRS)
+    if np.count_nonzero(others) < least:
+        return np.zeros((2, 2))
+    residual = plane.residual_px[others]
+    middle = np.median(residual, axis=0)
+    spread = np.median(np.abs(residual - middle)) * 2.0
+    shared = (np.abs(residual - middle) <= 2.0 * spread).all(axis=1)
+    count = int(np.count_nonzero(shared))
+    if count < least or float(np.hypot(*middle)) < 2.0 * spread:
+        return np.zeros((2, 2))
+    return count / (count + inliers) * np.outer(middle, middle)
 
 
 def _consensus(source: FloatArray, target: FloatArray, inlier_px: float) -> tuple[FloatArray | None, float]:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from standoff.core.compiled import compiled
+from standoff.core.compiled import compiled, solved
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import IntArray
 
@@ -30,19 +30,6 @@ _COLUMNS, _ROWS = 4, 3
 _CORRELATION_FLOOR = 0.02
 """Least correlation of two errors in a block: what few points cannot show, they may have."""
 
-_RELIEF_SHARE = 0.68
-_RELIEF_REACH = 2.5
-"""Points further off than so many times the reach of the nearer two thirds do not count as relief."""
-
-_RELIEF_PART = 0.5
-"""Share of the points' variance in height that the plane as a whole may be off by; chosen on the simulated clips."""
-
-_NOISE_MARGIN = 1.2
-"""Times the noise's variance: neither it nor the residuals' is known better from a hundred points."""
-
-_SECOND_SHARE = 0.2
-"""Share of the points from which a second motion that they share makes the first one doubtful."""
-
 
 @compiled
 def expect_points(points: FloatArray, pose: FloatArray, back: FloatArray, ratio: float) -> FloatArray:
@@ -56,85 +43,74 @@ def expect_points(points: FloatArray, pose: FloatArray, back: FloatArray, ratio:
     """
     expected = np.full((len(points), 2), np.nan)
     for n in range(len(points)):
-        x, y, w = pose @ np.array([points[n, 0], points[n, 1], 1.0])
+        x, y = points[n, 0], points[n, 1]
+        w = pose[2, 0] * x + pose[2, 1] * y + pose[2, 2]
         if not w > 0.0:
             continue
-        x, y = x / w, y / w
+        x, y = (
+            (pose[0, 0] * x + pose[0, 1] * y + pose[0, 2]) / w,
+            (pose[1, 0] * x + pose[1, 1] * y + pose[1, 2]) / w,
+        )
         expected[n, 0], expected[n, 1] = x, y
-        before_x, before_y, before_w = back @ np.array([x, y, 1.0])
-        if before_w > 0.0:
-            expected[n, 0] += ratio * (x - before_x / before_w)
-            expected[n, 1] += ratio * (y - before_y / before_w)
+        w = back[2, 0] * x + back[2, 1] * y + back[2, 2]
+        if w > 0.0:
+            expected[n, 0] += ratio * (x - (back[0, 0] * x + back[0, 1] * y + back[0, 2]) / w)
+            expected[n, 1] += ratio * (y - (back[1, 0] * x + back[1, 1] * y + back[1, 2]) / w)
     return expected
 
 
 @compiled
 def refine(
-    source: FloatArray, target: FloatArray, start: FloatArray, reach_px: float, inlier_px: float, followed_px: float
+    places: FloatArray, wanted: FloatArray, matrix: FloatArray, reach: float, inlier: float, followed: float
 ) -> tuple[bool, FloatArray, FloatArray, FloatArray, BoolArray]:
     """Refine a homography by reweighted least squares of the distances in the target, with Tukey's weights.
 
     Args:
-        source: (N, 2), exact.
-        target: (N, 2) with errors, some of them large.
-        start: (3, 3) good to `reach_px`.
-        reach_px: See `start`.
-        inlier_px: Points much further off than this never take part.
-        followed_px: Size of one pixel of the picture in which the points were followed.
+        places: (N, 2), exact.
+        wanted: (N, 2) where they should come to lie, with errors, some of them large.
+        matrix: (3, 3) to begin with, good to `reach`; its lower right entry is 1.
+        reach: See `matrix`.
+        inlier: Points much further off than this never take part.
+        followed: One pixel of the picture in which the points were followed.
 
     Returns:
-        Whether enough pairs agree, and what `PlaneMotion` holds: (3, 3), (9, 9), (N, 2) and (N,).
+        Whether enough pairs agree; (3, 3) the matrix; (8, 8) covariance of its entries but the last; (N, 2) how far
+        off the points are; (N,) which of them share the motion.
     """
-    by_source, by_target = _normalisation(source), _normalisation(target)
-    unit, back = by_target[0, 0], np.linalg.inv(by_target)
-    places, wanted = _normalised(by_source, source), _normalised(by_target, target)
-    matrix = by_target @ start @ np.linalg.inv(by_source)
-    matrix /= matrix[2, 2]
-    sigma, most, floor = reach_px * unit / 3.0, inlier_px * unit / 2.0, _SIGMA_FLOOR * followed_px * unit
-    nothing = False, matrix, np.zeros((9, 9)), wanted, np.zeros(len(source), dtype=np.bool_)
+    count, matrix = len(places), matrix.copy()
+    sigma, most, floor = reach / 3.0, inlier / 2.0, _SIGMA_FLOOR * followed
+    weight, inliers, unit = np.empty(count), np.zeros(count, dtype=np.bool_), np.eye(_PARAMETERS)
     for _ in range(_ROUNDS):
         residual, jacobian, length = _linear(matrix, places, wanted)
-        weight = np.maximum(1.0 - (length / (_TUKEY * min(sigma, most))) ** 2, 0.0) ** 2
-        close = np.sort(length[weight > 0.0])
-        if len(close) < MIN_PAIRS:
-            return nothing
+        close = 0
+        for n in range(count):
+            weight[n] = max(1.0 - (length[n] / (_TUKEY * min(sigma, most))) ** 2, 0.0) ** 2
+            # Those that take part come first once sorted.
+            length[n] = length[n] if weight[n] > 0.0 else np.inf
+            close += weight[n] > 0.0
+        if close < MIN_PAIRS:
+            return False, matrix, unit, residual, inliers
         information, pull = _normal_equations(jacobian, residual, weight)
-        step = np.linalg.solve(information, pull)
+        step, largest = solved(information, pull), 0.0
         for k in range(_PARAMETERS):
-            matrix[k // 3, k % 3] += step[k]
+            matrix[k // 3, k % 3] += step[k, 0]
+            largest = max(largest, abs(step[k, 0]))
         # The median length of a plane normal error is 1.177 of its standard error along one axis.
-        sigma = max(close[len(close) // 2] / 1.177, floor)
-        if np.abs(step).max() < _CONVERGED:
+        sigma = max(np.sort(length)[close // 2] / 1.177, floor)
+        if largest < _CONVERGED:
             break
     residual, jacobian, length = _linear(matrix, places, wanted)
-    inlier = length < 3.0 * min(sigma, most)
-    if inlier.sum() < MIN_PAIRS:
-        return nothing
-    information, _ = _normal_equations(jacobian, residual, inlier.astype(np.float64))
-    parameters = np.linalg.inv(information)
-    variance = max((residual[inlier] ** 2).sum() / max(2 * inlier.sum() - _PARAMETERS, 1), floor**2)
-    block = _blocks(places)
-    together = _inflation(residual[inlier], jacobian[inlier], parameters, block[inlier], variance)
-    covariance = np.zeros((9, 9))
-    covariance[:8, :8] = variance * together * parameters
-    signed, by_entries = _in_pixels(matrix, by_source, back, source[inlier])
-    return True, signed, by_entries @ covariance @ by_entries.T, residual / unit, inlier
-
-
-@compiled
-def _normalisation(points: FloatArray) -> FloatArray:
-    """Return the (3, 3) of `homography.normalisation`."""
-    x, y = points[:, 0].mean(), points[:, 1].mean()
-    scale = np.sqrt(2.0) / np.sqrt(((points[:, 0] - x) ** 2 + (points[:, 1] - y) ** 2).mean())
-    return np.array([[scale, 0.0, -scale * x], [0.0, scale, -scale * y], [0.0, 0.0, 1.0]])
-
-
-@compiled
-def _normalised(similarity: FloatArray, points: FloatArray) -> FloatArray:
-    places = np.empty_like(points)
-    for axis in range(2):
-        places[:, axis] = similarity[axis, axis] * points[:, axis] + similarity[axis, 2]
-    return places
+    agreeing, squares = 0, 0.0
+    for n in range(count):
+        inliers[n] = length[n] < 3.0 * min(sigma, most)
+        weight[n] = 1.0 if inliers[n] else 0.0
+        agreeing += inliers[n]
+        squares += weight[n] * length[n] ** 2
+    information, _ = _normal_equations(jacobian, residual, weight)
+    parameters = solved(information, unit)
+    variance = max(squares / max(2 * agreeing - _PARAMETERS, 1), floor**2)
+    inflation = _inflation(residual, jacobian, weight, parameters, _blocks(places), variance)
+    return agreeing >= MIN_PAIRS, matrix, variance * inflation * parameters, residual, inliers
 
 
 @compiled
@@ -163,110 +139,87 @@ def _linear(matrix: FloatArray, places: FloatArray, wanted: FloatArray) -> tuple
 
 @compiled
 def _normal_equations(jacobian: FloatArray, residual: FloatArray, weight: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return (8, 8) and (8,)."""
-    information, pull = np.zeros((_PARAMETERS, _PARAMETERS)), np.zeros(_PARAMETERS)
+    """Return (8, 8) and (8, 1)."""
+    information, pull = np.zeros((_PARAMETERS, _PARAMETERS)), np.zeros((_PARAMETERS, 1))
     for n in range(len(weight)):
         if not weight[n] > 0.0:
             continue
         for axis in range(2):
             for i in range(_PARAMETERS):
                 weighted = weight[n] * jacobian[n, axis, i]
-                pull[i] += weighted * residual[n, axis]
+                pull[i, 0] += weighted * residual[n, axis]
                 for j in range(_PARAMETERS):
                     information[i, j] += weighted * jacobian[n, axis, j]
     return information, pull
 
 
 @compiled
-def _in_pixels(
-    matrix: FloatArray, by_source: FloatArray, back: FloatArray, in_front: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return the (3, 3) in pixels, of unit norm and signed by points (K, 2) in front, and (9, 9) by the entries."""
-    in_pixels = back @ matrix @ by_source
-    scale = 1.0 / np.sqrt((in_pixels**2).sum())
-    if in_pixels[2, 0] * in_front[:, 0].mean() + in_pixels[2, 1] * in_front[:, 1].mean() + in_pixels[2, 2] <= 0.0:
-        scale = -scale
-    by_entries = np.empty((9, 9))
-    for row in range(9):
-        for entry in range(9):
-            by_entries[row, entry] = scale * back[row // 3, entry // 3] * by_source[entry % 3, row % 3]
-    return scale * in_pixels, by_entries
-
-
-@compiled
 def _inflation(
-    residual: FloatArray, jacobian: FloatArray, parameters: FloatArray, block: IntArray, variance: float
+    residual: FloatArray,
+    jacobian: FloatArray,
+    weight: FloatArray,
+    parameters: FloatArray,
+    block: IntArray,
+    variance: float,
 ) -> float:
     """Return by how much errors that go together within a block raise the variance over independent ones.
 
     A fit turns independent errors into residuals that go against each other; the hat matrix says by how much.
 
     Args:
-        residual: (K, 2).
-        jacobian: (K, 2, 8).
+        residual: (N, 2).
+        jacobian: (N, 2, 8).
+        weight: (N,) 1 for those that count, 0 for all others.
         parameters: (8, 8) covariance of the parameters for errors of unit variance.
-        block: (K,) numbers.
+        block: (N,) numbers.
         variance: Of a residual along one axis.
     """
     blocks = _COLUMNS * _ROWS
     sizes, summed, rows = np.zeros(blocks), np.zeros((blocks, 2)), np.zeros((blocks, 2, _PARAMETERS))
+    together, hat, counted, pairs = 0.0, 0.0, 0.0, 0.0
     for n in range(len(block)):
+        if not weight[n] > 0.0:
+            continue
+        counted += 1.0
         sizes[block[n]] += 1.0
-        summed[block[n]] += residual[n]
-        # Rows of the Jacobian summed over a block stand for all of its pairs at once.
-        rows[block[n]] += jacobian[n]
-    pairs = (sizes * (sizes - 1.0)).sum()
+        for axis in range(2):
+            summed[block[n], axis] += residual[n, axis]
+            together -= residual[n, axis] ** 2
+            hat -= _spread(jacobian[n, axis], parameters)
+            # Rows of the Jacobian summed over a block stand for all of its pairs at once.
+            for k in range(_PARAMETERS):
+                rows[block[n], axis, k] += jacobian[n, axis, k]
+    for k in range(blocks):
+        pairs += sizes[k] * (sizes[k] - 1.0)
+        for axis in range(2):
+            together += summed[k, axis] ** 2
+            hat += _spread(rows[k, axis], parameters)
     if pairs == 0.0:
         return 1.0
-    together = ((summed**2).sum() - (residual**2).sum()) / variance
-    summed_rows, own = rows.reshape(-1, _PARAMETERS), jacobian.copy().reshape(-1, _PARAMETERS)
-    hat = ((summed_rows @ parameters) * summed_rows).sum() - ((own @ parameters) * own).sum()
-    correlation = min(max((together + hat) / (2.0 * pairs), _CORRELATION_FLOOR), 1.0)
-    return 1.0 + pairs / len(block) * correlation
+    correlation = min(max((together / variance + hat) / (2.0 * pairs), _CORRELATION_FLOOR), 1.0)
+    return 1.0 + pairs / counted * correlation
+
+
+@compiled
+def _spread(row: FloatArray, covariance: FloatArray) -> float:
+    """Return the variance of a weighted sum (P,) of parameters."""
+    variance = 0.0
+    for i in range(len(row)):
+        for k in range(len(row)):
+            variance += row[i] * covariance[i, k] * row[k]
+    return variance
 
 
 @compiled
 def _blocks(points: FloatArray) -> IntArray:
     """Return (N,) the number of the block of the points' own extent that each lies in."""
-    low_x, low_y = points[:, 0].min(), points[:, 1].min()
-    wide, high = max(points[:, 0].max() - low_x, 1e-9), max(points[:, 1].max() - low_y, 1e-9)
+    low_x, low_y, high_x, high_y = points[0, 0], points[0, 1], points[0, 0], points[0, 1]
+    for n in range(len(points)):
+        low_x, high_x = min(low_x, points[n, 0]), max(high_x, points[n, 0])
+        low_y, high_y = min(low_y, points[n, 1]), max(high_y, points[n, 1])
     numbers = np.empty(len(points), dtype=np.int64)
     for n in range(len(points)):
-        column = min(int((points[n, 0] - low_x) / wide * _COLUMNS), _COLUMNS - 1)
-        row = min(int((points[n, 1] - low_y) / high * _ROWS), _ROWS - 1)
+        column = min(int((points[n, 0] - low_x) / max(high_x - low_x, 1e-9) * _COLUMNS), _COLUMNS - 1)
+        row = min(int((points[n, 1] - low_y) / max(high_y - low_y, 1e-9) * _ROWS), _ROWS - 1)
         numbers[n] = row * _COLUMNS + column
     return numbers
-
-
-@compiled
-def relief_of(matrix: FloatArray, residual_px: FloatArray, inlier: BoolArray, noise_px: float) -> FloatArray:
-    """Return what `plane.relief_covariance` does."""
-    length = np.sqrt(residual_px[:, 0] ** 2 + residual_px[:, 1] ** 2)
-    near = residual_px[length <= _RELIEF_REACH * np.quantile(length, _RELIEF_SHARE)]
-    excess, axes = np.linalg.eigh(near.T @ near / max(len(near), 1) - _NOISE_MARGIN * noise_px**2 * np.eye(2))
-    shift = _RELIEF_PART * (axes * np.maximum(excess, 0.0)) @ axes.T + _second_shift(residual_px, inlier)
-    by_shift = np.zeros((9, 2))
-    by_shift[0:3, 0] = by_shift[3:6, 1] = matrix[2]
-    return by_shift @ shift @ by_shift.T
-
-
-@compiled
-def _second_shift(residual_px: FloatArray, inlier: BoolArray) -> FloatArray:
-    """Return (2, 2) the spread of a mixture of the plane and of a second motion, weighted by their points.
-
-    As a shift: a homography of few points close together says nothing of the rest of the picture.
-    """
-    inliers = inlier.sum()
-    least = max(_SECOND_SHARE * inliers, MIN_PAIRS)
-    if len(inlier) - inliers < least:
-        return np.zeros((2, 2))
-    residual = residual_px[~inlier]
-    middle = np.array([np.median(residual[:, 0]), np.median(residual[:, 1])])
-    off = np.abs(residual - middle)
-    spread = np.median(off) * 2.0
-    count = 0
-    for n in range(len(off)):
-        count += max(off[n, 0], off[n, 1]) <= 2.0 * spread
-    if count < least or np.hypot(middle[0], middle[1]) < 2.0 * spread:
-        return np.zeros((2, 2))
-    return count / (count + inliers) * np.outer(middle, middle)
