@@ -253,15 +253,16 @@ def vector_from_rotation(rotation: FloatArray) -> FloatArray:
 
 def _is_rotation(matrix: FloatArray) -> bool:
     """Return whether the rows of (3, 3) are unit vectors at right angles, right-handed; numpy would take longer."""
-    x, y, z = matrix.tolist()
-    across = [x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]]
-    unit = [abs(_dot(axis, axis) - 1.0) <= _MAX_STRETCH for axis in (x, y, z)]
-    upright = [abs(_dot(*axes)) <= _MAX_SKEW for axes in ((x, y), (y, z), (z, x))]
-    return all(unit) and all(upright) and _dot(across, z) > 0.0
-
-
-def _dot(one: list[float], other: list[float]) -> float:
-    return one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
+    (a, b, c), (d, e, f), (g, h, i) = matrix.tolist()
+    return (
+        abs(a * a + b * b + c * c - 1.0) <= _MAX_STRETCH
+        and abs(d * d + e * e + f * f - 1.0) <= _MAX_STRETCH
+        and abs(g * g + h * h + i * i - 1.0) <= _MAX_STRETCH
+        and abs(a * d + b * e + c * f) <= _MAX_SKEW
+        and abs(d * g + e * h + f * i) <= _MAX_SKEW
+        and abs(g * a + h * b + i * c) <= _MAX_SKEW
+        and (b * f - c * e) * g + (c * d - a * f) * h + (a * e - b * d) * i > 0.0
+    )
 
 
 def poses_of_plane(plane_to_camera: FloatArray) -> tuple[FloatArray, FloatArray]:

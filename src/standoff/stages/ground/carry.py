@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from standoff.core import homography
-from standoff.core.camera import Camera
+from standoff.core.compiled import compiled, solved
 from standoff.core.homography import FloatArray
-from standoff.core.pose import LENS, POSE, View
+from standoff.core.pose import POSE, View
 from standoff.core.types import CameraMotion
-from standoff.stages.ground.projection import project_with_jacobians
+from standoff.stages.ground.projection import on_ground, projected, turned_by
 from standoff.stages.ground.solid import STATE
 
 _COLUMNS, _ROWS = 7, 5
@@ -19,8 +19,10 @@ _MIN_POINTS = 8
 _FAR_HEIGHTS = 8.0
 """Ground further away than so many times the camera's height is too near the horizon to carry anything."""
 
-_ROUNDS = 5
+_ROUNDS, _STILL = 5, 1e-7
 _MAX_MISFIT_PX = 4.0
+
+_GRID = np.array([(column, row) for row in range(_ROWS) for column in range(_COLUMNS)], dtype=np.float64)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,73 +64,154 @@ def carry(key: View, motion: CameraMotion, guess: View) -> Carried | None:
     Returns:
         The view and its derivatives, or None where no camera could have moved the picture so.
     """
+    camera, lens_known = key.camera, motion.camera is not None
     # Motion of undistorted points is motion in the pictures of a camera without distortion.
-    camera = key.camera if motion.camera is None else _straight(key.camera)
-    then = View(camera, key.position_m, key.site_to_camera)
-    now = View(camera, guess.position_m, guess.site_to_camera)
-    seen_px, places = _ground_grid(then)
-    moved_px, valid = homography.apply(motion.keyframe_to_image, seen_px)
-    seen_px, places, moved_px = seen_px[valid], places[valid], moved_px[valid]
+    distortion, fold_r2 = (np.zeros(5), np.inf) if lens_known else (camera.distortion, camera.first_fold_r2())
+    then = key.position_m, key.site_to_camera, camera.matrix, distortion
+    grid_px = (_GRID + 0.5) * np.array([camera.width_px / _COLUMNS, camera.height_px / _ROWS])
+    seen_px, places, moved_px = _ground_moved(grid_px, motion.keyframe_to_image, *then, fold_r2)
     if len(seen_px) < _MIN_POINTS:
         return None
-    for _ in range(_ROUNDS):
-        points_px, by_view, _ = project_with_jacobians(now, places)
-        misfit = (moved_px - points_px).ravel()
-        if not np.isfinite(misfit).all():
-            return None
-        change = np.zeros(8)
-        change[POSE] = np.linalg.lstsq(by_view[:, :, POSE].reshape(-1, 6), misfit, rcond=None)[0]
-        now = now.changed(change)
-        if np.abs(change).max() < 1e-7:
-            break
-    points_px, by_view, by_point = project_with_jacobians(now, places)
-    misfit = (moved_px - points_px).ravel()
-    rms_px = float(np.sqrt((misfit**2).mean()))
+    lens = camera.matrix, distortion
+    position_m, rotation, rms_px = _follow(places, moved_px, guess.position_m, guess.site_to_camera, *lens)
     if not rms_px < _MAX_MISFIT_PX:
         return None
-    solve = np.asarray(np.linalg.pinv(by_view[:, :, POSE].reshape(-1, 6)), dtype=np.float64)
-    return Carried(
-        view=View(key.camera, now.position_m, now.site_to_camera),
-        by_key=_by_key(then, places, by_view, by_point, solve, lens_known=motion.camera is not None),
-        added=_added(motion, seen_px, solve, rms_px),
+    variance, by_state, by_entries = _derivatives(
+        seen_px, places, moved_px, motion.keyframe_to_image, position_m, rotation, *then
     )
-
-
-def _by_key(
-    then: View, places: FloatArray, by_view: FloatArray, by_point: FloatArray, solve: FloatArray, *, lens_known: bool
-) -> FloatArray:
-    """Return (9, 9): the points of the ground move with the keyframe's state, and the view now follows them."""
-    _, then_by_view, then_by_point = project_with_jacobians(then, places)
-    ground_by_key = -np.linalg.solve(then_by_point[:, :, :2], then_by_view)
-    image_by_key = by_point[:, :, :2] @ ground_by_key
-    image_by_key[:, :, LENS] += by_view[:, :, LENS]
     if lens_known:
-        image_by_key[:, :, 7] = 0.0
-    by_key = np.eye(STATE)
-    by_key[POSE, :8] = -solve @ image_by_key.reshape(-1, 8)
-    return by_key
-
-
-def _added(motion: CameraMotion, seen_px: FloatArray, solve: FloatArray, rms_px: float) -> FloatArray:
-    """Return (9, 9) the pose's share of the motion's error, and of what no pose explains of the motion."""
-    by_entries = homography.parameter_jacobian(motion.keyframe_to_image, seen_px).reshape(-1, 9)
-    to_pose = solve @ by_entries
-    added = np.zeros((STATE, STATE))
-    added[POSE, POSE] = to_pose @ motion.covariance @ to_pose.T
+        by_state[:, 7] = 0.0
+    by_key, added = np.eye(STATE), np.zeros((STATE, STATE))
+    by_key[POSE, :8] = -by_state
     # The misfit is smooth over the picture: its eight degrees of freedom count, not the number of points.
-    added[POSE, POSE] += rms_px**2 * (len(seen_px) / 4.0) * (solve @ solve.T)
-    return added
+    misfit = rms_px**2 * (len(seen_px) / 4.0) * variance
+    added[POSE, POSE] = by_entries @ motion.covariance @ by_entries.T + misfit
+    return Carried(View(camera, position_m, rotation), by_key, added)
 
 
-def _straight(camera: Camera) -> Camera:
-    return Camera(camera.width_px, camera.height_px, camera.matrix, np.zeros(5))
+@compiled
+def _ground_moved(
+    grid_px: FloatArray,
+    keyframe_to_image: FloatArray,
+    position_m: FloatArray,
+    rotation: FloatArray,
+    matrix: FloatArray,
+    distortion: FloatArray,
+    first_fold_r2: float,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return those of the points (G, 2) of the keyframe that show ground, near enough and still ahead after the motion.
+
+    Returns:
+        (N, 2) themselves; (N, 3) the places that they show; (N, 2) where these are in the picture now.
+    """
+    xy_m = on_ground(grid_px, position_m, rotation, matrix, distortion, first_fold_r2)
+    seen_px, places, moved_px = np.empty_like(grid_px), np.zeros((len(grid_px), 3)), np.empty_like(grid_px)
+    found = 0
+    for n in range(len(grid_px)):
+        away_m = np.sqrt((xy_m[n, 0] - position_m[0]) ** 2 + (xy_m[n, 1] - position_m[1]) ** 2)
+        w = _row(keyframe_to_image, 2, grid_px[n])
+        if away_m < _FAR_HEIGHTS * abs(position_m[2]) and w > 0.0:
+            for axis in range(2):
+                seen_px[found, axis], places[found, axis] = grid_px[n, axis], xy_m[n, axis]
+                moved_px[found, axis] = _row(keyframe_to_image, axis, grid_px[n]) / w
+            found += 1
+    return seen_px[:found], places[:found], moved_px[:found]
 
 
-def _ground_grid(view: View) -> tuple[FloatArray, FloatArray]:
-    """Return (N, 2) pixels spread over the ground in the picture, and (N, 3) the places that they show."""
-    width, height = view.camera.width_px, view.camera.height_px
-    x, y = np.meshgrid((np.arange(_COLUMNS) + 0.5) / _COLUMNS * width, (np.arange(_ROWS) + 0.5) / _ROWS * height)
-    points_px = np.column_stack([x.ravel(), y.ravel()])
-    xy_m = view.to_plane(points_px)
-    near = np.linalg.norm(xy_m - view.position_m[:2], axis=1) < _FAR_HEIGHTS * abs(view.position_m[2])
-    return points_px[near], np.column_stack([xy_m[near], np.zeros(near.sum())])
+@compiled
+def _row(matrix: FloatArray, row: int, point: FloatArray) -> float:
+    """Return what one row of a homography makes of a point (2,)."""
+    value: float = matrix[row, 0] * point[0] + matrix[row, 1] * point[1] + matrix[row, 2]
+    return value
+
+
+@compiled
+def _follow(
+    places: FloatArray,
+    moved_px: FloatArray,
+    position_m: FloatArray,
+    rotation: FloatArray,
+    matrix: FloatArray,
+    distortion: FloatArray,
+) -> tuple[FloatArray, FloatArray, float]:
+    """Return the position (3,) and rotation (3, 3) from which places are seen nearest to where they moved.
+
+    And how far off they are, root mean square; NaN where they are behind the camera.
+    """
+    position_m, rotation = position_m.copy(), rotation.copy()
+    pull = np.empty((6, 1))
+    for _ in range(_ROUNDS):
+        points_px, by_view, _ = projected(places, position_m, rotation, matrix, distortion)
+        pull[:] = 0.0
+        for n in range(len(places)):
+            for axis in range(2):
+                for k in range(6):
+                    pull[k, 0] += by_view[n, axis, k] * (moved_px[n, axis] - points_px[n, axis])
+        change = solved(_by_pose_squared(by_view), pull)
+        largest = 0.0
+        for k in range(6):
+            largest = max(largest, abs(change[k, 0]))
+        rotation = turned_by(change[:3, 0], rotation)
+        for axis in range(3):
+            position_m[axis] += change[3 + axis, 0]
+        if largest < _STILL:
+            break
+    points_px, _, _ = projected(places, position_m, rotation, matrix, distortion)
+    squares = 0.0
+    for n in range(len(places)):
+        squares += (moved_px[n, 0] - points_px[n, 0]) ** 2 + (moved_px[n, 1] - points_px[n, 1]) ** 2
+    return position_m, rotation, np.sqrt(squares / (2 * len(places)))
+
+
+@compiled
+def _by_pose_squared(by_view: FloatArray) -> FloatArray:
+    """Return (6, 6) the derivative by the pose, squared and summed over all points."""
+    squared = np.zeros((6, 6))
+    for n in range(len(by_view)):
+        for axis in range(2):
+            for i in range(6):
+                for k in range(6):
+                    squared[i, k] += by_view[n, axis, i] * by_view[n, axis, k]
+    return squared
+
+
+@compiled
+def _derivatives(
+    seen_px: FloatArray,
+    places: FloatArray,
+    moved_px: FloatArray,
+    keyframe_to_image: FloatArray,
+    position_m: FloatArray,
+    rotation: FloatArray,
+    then_position_m: FloatArray,
+    then_rotation: FloatArray,
+    matrix: FloatArray,
+    distortion: FloatArray,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return what moves the pose that follows the points.
+
+    Returns:
+        (6, 6) its covariance for points of unit variance; (6, 8) what a change of the keyframe's view, by which the
+        places of the points move, asks of it; (6, 9) its derivative by the motion's entries.
+    """
+    _, by_view, by_point = projected(places, position_m, rotation, matrix, distortion)
+    _, then_by_view, then_by_point = projected(places, then_position_m, then_rotation, matrix, distortion)
+    by_state, by_entries, unit = np.zeros((6, 8)), np.zeros((6, 9)), np.eye(6)
+    for n in range(len(places)):
+        a, b, c, d = then_by_point[n, 0, 0], then_by_point[n, 0, 1], then_by_point[n, 1, 0], then_by_point[n, 1, 1]
+        w = _row(keyframe_to_image, 2, seen_px[n])
+        for axis in range(2):
+            # By the pixel in the keyframe: a change of the view there moves the place that it shows.
+            first = (by_point[n, axis, 0] * d - by_point[n, axis, 1] * c) / (a * d - b * c)
+            second = (by_point[n, axis, 1] * a - by_point[n, axis, 0] * b) / (a * d - b * c)
+            for i in range(6):
+                share = by_view[n, axis, i]
+                for k in range(8):
+                    moves = -first * then_by_view[n, 0, k] - second * then_by_view[n, 1, k]
+                    by_state[i, k] += share * (moves + (by_view[n, axis, k] if k >= 6 else 0.0))
+                for k in range(3):
+                    over_w = (seen_px[n, k] if k < 2 else 1.0) / w
+                    by_entries[i, 3 * axis + k] += share * over_w
+                    by_entries[i, 6 + k] -= share * moved_px[n, axis] * over_w
+    squared = _by_pose_squared(by_view)
+    return solved(squared, unit), solved(squared, by_state), solved(squared, by_entries)

@@ -63,6 +63,8 @@ class Placement:
 
     def own_view(self, site: View) -> View:
         """Return a camera of the site in the own frame."""
+        if self.turn_rad == 0.0 and not self.xy_m.any():
+            return site
         turn = _upright(self.turn_rad)
         position_m = turn.T @ (site.position_m - np.append(self.xy_m, 0.0))
         return View(site.camera, position_m, site.site_to_camera @ turn)

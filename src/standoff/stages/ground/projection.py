@@ -8,9 +8,24 @@ from __future__ import annotations
 
 import numpy as np
 
+from standoff.core.compiled import compiled
 from standoff.core.homography import FloatArray
 from standoff.core.pose import CHANGES, View
-from standoff.stages.ground.compiled import compiled
+
+_UNDISTORT_ITERATIONS, _UNDISTORT_TOLERANCE, _UNDISTORTED = 50, 1e-12, 1e-9
+"""Of Newton's method as in `Camera.undistort`, in normalised coordinates."""
+
+Eye = tuple[FloatArray, FloatArray, FloatArray, FloatArray, float]
+
+
+def eye_of(view: View) -> Eye:
+    """Return what compiled loops take for a view.
+
+    That is its position (3,), its rotation (3, 3), its camera matrix (3, 3), its distortion (5,), and the square of
+    the radius at which the lens's polynomial first turns back.
+    """
+    camera = view.camera
+    return view.position_m, view.site_to_camera, camera.matrix, camera.distortion, camera.first_fold_r2()
 
 
 def project(view: View, points_m: FloatArray) -> FloatArray:
@@ -23,9 +38,20 @@ def project(view: View, points_m: FloatArray) -> FloatArray:
     Returns:
         (N, 2) pixels, in or outside the picture; NaN behind the camera or outside the lens model.
     """
-    camera = view.camera
-    lens = camera.matrix, camera.distortion, camera.first_fold_r2()
-    return _seen(np.ascontiguousarray(points_m), view.position_m, view.site_to_camera, *lens)
+    return seen(np.ascontiguousarray(points_m), *eye_of(view))
+
+
+def to_plane(view: View, points_px: FloatArray) -> FloatArray:
+    """Intersect the rays of picture points with the ground z = 0, as `View.to_plane`.
+
+    Args:
+        view: The camera.
+        points_px: (N, 2), as seen in the picture.
+
+    Returns:
+        (N, 2) x east, y north; NaN where the ray does not meet the ground in front of the camera.
+    """
+    return on_ground(np.ascontiguousarray(points_px), *eye_of(view))
 
 
 def project_with_jacobians(view: View, points_m: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -39,13 +65,13 @@ def project_with_jacobians(view: View, points_m: FloatArray) -> tuple[FloatArray
         (N, 2) pixels as seen in the picture; (N, 2, 8) their derivative by a change of the view; (N, 2, 3) by the
         points; NaN behind the camera.
     """
-    return _projected(
+    return projected(
         np.ascontiguousarray(points_m), view.position_m, view.site_to_camera, view.camera.matrix, view.camera.distortion
     )
 
 
 @compiled
-def _seen(
+def seen(
     points_m: FloatArray,
     position_m: FloatArray,
     rotation: FloatArray,
@@ -53,6 +79,7 @@ def _seen(
     distortion: FloatArray,
     first_fold_r2: float,
 ) -> FloatArray:
+    """Return what `project` does, for an eye as `eye_of` tells it."""
     pixels = np.full((len(points_m), 2), np.nan)
     in_camera, bent, slope = np.empty(3), np.empty(2), np.empty((2, 2))
     for n in range(len(points_m)):
@@ -69,13 +96,14 @@ def _seen(
 
 
 @compiled
-def _projected(
+def projected(
     points_m: FloatArray,
     position_m: FloatArray,
     rotation: FloatArray,
     matrix: FloatArray,
     distortion: FloatArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return what `project_with_jacobians` does."""
     count = len(points_m)
     pixels, by_view, by_point = np.empty((count, 2)), np.empty((count, 2, CHANGES)), np.empty((count, 2, 3))
     in_camera, bent, slope, by_camera = np.empty(3), np.empty(2), np.empty((2, 2)), np.empty(3)
@@ -102,6 +130,78 @@ def _projected(
             by_view[n, axis, 6] = focal * bent[axis]
             by_view[n, axis, 7] = focal * (x * x + y * y) * (x if axis == 0 else y)
     return pixels, by_view, by_point
+
+
+@compiled
+def on_ground(
+    points_px: FloatArray,
+    position_m: FloatArray,
+    rotation: FloatArray,
+    matrix: FloatArray,
+    distortion: FloatArray,
+    first_fold_r2: float,
+) -> FloatArray:
+    """Return what `to_plane` does."""
+    places = np.full((len(points_px), 2), np.nan)
+    straight, ray = np.empty(2), np.empty(3)
+    for n in range(len(points_px)):
+        x = (points_px[n, 0] - matrix[0, 2]) / matrix[0, 0]
+        y = (points_px[n, 1] - matrix[1, 2]) / matrix[1, 1]
+        if not _straighten(x, y, distortion, first_fold_r2, straight):
+            continue
+        for k in range(3):
+            ray[k] = straight[0] * rotation[0, k] + straight[1] * rotation[1, k] + rotation[2, k]
+        reach = -position_m[2] / ray[2]
+        if reach > 0.0 and np.isfinite(reach):
+            places[n, 0], places[n, 1] = position_m[0] + reach * ray[0], position_m[1] + reach * ray[1]
+    return places
+
+
+@compiled
+def turned_by(vector: FloatArray, rotation: FloatArray) -> FloatArray:
+    """Return a rotation (3, 3) after a turn by a vector (3,), as `View.changed` turns a view."""
+    angle = np.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
+    # Both factors at their limits, where the quotients would lose them.
+    sine, bend = 1.0, 0.5
+    if angle >= 1e-8:
+        sine, bend = np.sin(angle) / angle, (1.0 - np.cos(angle)) / angle**2
+    turned = np.empty((3, 3))
+    for k in range(3):
+        x, y, z = rotation[0, k], rotation[1, k], rotation[2, k]
+        along = bend * (vector[0] * x + vector[1] * y + vector[2] * z)
+        kept = 1.0 - bend * angle**2
+        turned[0, k] = kept * x + along * vector[0] + sine * (vector[1] * z - vector[2] * y)
+        turned[1, k] = kept * y + along * vector[1] + sine * (vector[2] * x - vector[0] * z)
+        turned[2, k] = kept * z + along * vector[2] + sine * (vector[0] * y - vector[1] * x)
+    # A Newton step to the nearest rotation, so that many small turns in a row remain one.
+    nearest = np.empty((3, 3))
+    for i in range(3):
+        for k in range(3):
+            nearest[i, k] = 1.5 * turned[i, k]
+            for j in range(3):
+                across = turned[i, 0] * turned[j, 0] + turned[i, 1] * turned[j, 1] + turned[i, 2] * turned[j, 2]
+                nearest[i, k] -= 0.5 * across * turned[j, k]
+    return nearest
+
+
+@compiled
+def _straighten(x: float, y: float, distortion: FloatArray, first_fold_r2: float, straight: FloatArray) -> bool:
+    """Fill in (2,) the direction that the lens bends to x, y, by Newton's method; return whether there is one."""
+    bent, slope = np.empty(2), np.empty((2, 2))
+    straight[0], straight[1] = x, y
+    for _ in range(_UNDISTORT_ITERATIONS):
+        _bend(straight[0], straight[1], distortion, bent, slope)
+        off_x, off_y = bent[0] - x, bent[1] - y
+        determinant = slope[0, 0] * slope[1, 1] - slope[0, 1] * slope[1, 0]
+        if not max(abs(off_x), abs(off_y)) >= _UNDISTORT_TOLERANCE:
+            break
+        straight[0] -= (slope[1, 1] * off_x - slope[0, 1] * off_y) / determinant
+        straight[1] -= (slope[0, 0] * off_y - slope[1, 0] * off_x) / determinant
+    _bend(straight[0], straight[1], distortion, bent, slope)
+    determinant = slope[0, 0] * slope[1, 1] - slope[0, 1] * slope[1, 0]
+    unfolded = determinant > 0.0 and slope[0, 0] + slope[1, 1] > 0.0
+    unfolded = unfolded and straight[0] ** 2 + straight[1] ** 2 < first_fold_r2
+    return unfolded and max(abs(bent[0] - x), abs(bent[1] - y)) < _UNDISTORTED
 
 
 @compiled

@@ -14,6 +14,7 @@ import numpy as np
 from standoff.core.camera import Camera
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.pose import POSE, View
+from standoff.stages.ground.projection import project_with_jacobians
 from standoff.stages.ground.shape import ReferenceShape
 from standoff.stages.ground.solid import SolidState, facing_sides
 
@@ -52,7 +53,7 @@ def _fitted(state: SolidState, outline_px: FloatArray, shape: ReferenceShape, lo
     side = np.repeat(np.arange(len(outline_px)), len(_SHARES))
     points_m = np.column_stack([xy_m, np.where(lower, 0.0, state.height_m)[side]])
     for _ in range(_ROUNDS):
-        points_px, by_view, _ = view.project_with_jacobians(points_m)
+        points_px, by_view, _ = project_with_jacobians(view, points_m)
         off_px = ((outline_px[side] - points_px) * normal[side]).sum(axis=1)
         rows = np.einsum("ni,nij->nj", normal[side], by_view[:, :, POSE])
         if not (np.isfinite(off_px).all() and np.isfinite(rows).all()):

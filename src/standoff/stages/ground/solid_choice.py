@@ -9,6 +9,7 @@ import numpy as np
 
 from standoff.core.homography import FloatArray
 from standoff.core.types import IntArray, NoGroundMap
+from standoff.stages.ground.projection import project
 from standoff.stages.ground.shape import ReferenceShape
 from standoff.stages.ground.solid import SolidState
 from standoff.stages.ground.solid_fit import Belief, SolidFit
@@ -103,4 +104,4 @@ def _orders(shape: ReferenceShape) -> IntArray:
 
 def upper_px(state: SolidState, shape: ReferenceShape) -> FloatArray:
     """Return (N, 2) where the upper corners appear."""
-    return state.view.project(np.column_stack([shape.corners_m, np.full(len(shape.corners_m), state.height_m)]))
+    return project(state.view, np.column_stack([shape.corners_m, np.full(len(shape.corners_m), state.height_m)]))

@@ -8,11 +8,18 @@ import numpy as np
 
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import IntArray, Luma
-from standoff.stages.ground.projection import project, project_with_jacobians
+from standoff.stages.ground.projection import project
 from standoff.stages.ground.shape import ReferenceShape
 from standoff.stages.ground.solid import EdgeSamples, SolidState, sample_edges
 from standoff.stages.ground.solid_edges import Blurred, Looks, look_across
-from standoff.stages.ground.solid_rounds import choose_edges, edge_medians, expect_edges, normal_equations, weigh
+from standoff.stages.ground.solid_rounds import (
+    associate,
+    edge_medians,
+    find_change,
+    normal_equations,
+    support_of,
+    weigh,
+)
 
 _ROUNDS, _SETTLED_ROUNDS = 4, 2
 _STILL_PX = 0.01
@@ -32,7 +39,6 @@ steepness. Sharpening makes such pairs, too, but fainter ones."""
 _RESAMPLED, _OTHER_EDGES_M = 2, 0.1
 """So often a fit is begun again with a height that differs by so much from that whose edges it looked at."""
 
-_MIN_SAMPLES = 12
 _MAX_CHANGE = np.array([0.3, 0.3, 0.3, 20.0, 20.0, 20.0, 0.7, 0.3, 1.0])
 """A round of the fit moves no further: beyond, the derivatives say nothing."""
 
@@ -87,10 +93,12 @@ def side_support(support: FloatArray, lower_side: IntArray, count: int) -> Float
         lower_side: (E,) the side whose lower edge each is, or -1.
         count: Sides of the outline, whose upper edges come first.
     """
-    upper = np.nan_to_num(support[:count], nan=0.0)
-    lower = np.flatnonzero(lower_side >= 0)
-    np.maximum.at(upper, lower_side[lower], np.nan_to_num(support[lower], nan=0.0))
-    return upper
+    best = np.zeros(count)
+    for edge, share in enumerate(support.tolist()):
+        side = edge if edge < count else lower_side[edge]
+        if side >= 0 and share > best[side]:
+            best[side] = share
+    return best
 
 
 def fit_solid(
@@ -122,9 +130,7 @@ def fit_solid(
     return fit
 
 
-def _fit_from(
-    gray: Luma, shape: ReferenceShape, prior: Belief, half_px: float, state: SolidState
-) -> SolidFit | None:
+def _fit_from(gray: Luma, shape: ReferenceShape, prior: Belief, half_px: float, state: SolidState) -> SolidFit | None:
     samples = sample_edges(shape, state)
     picture = Blurred.around(gray, samples.points_px, half_px) if len(samples) else None
     if picture is None:
@@ -179,18 +185,17 @@ def outline_support(picture: Blurred, shape: ReferenceShape, state: SolidState) 
 
 def _step(samples: EdgeSamples, looks: Looks, place: _Place, prior: Belief) -> tuple[FloatArray, float] | None:
     """Return the change (9,) that one round finds, and how far it moves a sample; None if too little is there."""
-    residual, found, jacobian = _associated(samples, looks, place.state, place.gate_px)
-    weight, scatter_px = weigh(residual, found, looks.inside, samples.edge, samples.doubt_px)
-    believed = weight > 0.0
-    if np.count_nonzero(believed) < _MIN_SAMPLES:
-        return None
-    information, pull = normal_equations(jacobian, residual, weight, scatter_px, samples.edge, samples.doubt_px)
-    pull -= prior.information @ place.state.change_from(prior.state)
-    change = np.asarray(np.linalg.solve(information + prior.information, pull), dtype=np.float64)
-    if not np.isfinite(change).all():
-        return None
-    change = np.clip(change, -_MAX_CHANGE, _MAX_CHANGE)
-    return change, float(np.abs(jacobian[believed] @ change).max())
+    prior_pull = -prior.information @ place.state.change_from(prior.state)
+    change, moved_px = find_change(
+        *_associated(samples, looks, place.state, place.gate_px),
+        looks.inside,
+        samples.edge,
+        samples.doubt_px,
+        prior.information,
+        prior_pull,
+        _MAX_CHANGE,
+    )
+    return None if np.isnan(moved_px) else (change, moved_px)
 
 
 def _paired(samples: EdgeSamples, looks: Looks) -> tuple[EdgeSamples, Looks]:
@@ -257,25 +262,25 @@ def _finished(samples: EdgeSamples, looks: Looks, state: SolidState) -> SolidFit
 def _associated(
     samples: EdgeSamples, looks: Looks, state: SolidState, gate_px: float
 ) -> tuple[FloatArray, BoolArray, FloatArray]:
-    """Choose an edge of the picture for each sample.
-
-    Returns:
-        (N,) distance from the state's edge to the chosen one along the normal, 0 where there is none; (N,) whether
-        there is one; (N, 9) how the state's edge moves along the normal.
-    """
-    moved_px, jacobian = expect_edges(
-        *project_with_jacobians(state.view, samples.points_m(state.height_m)),
+    """Choose an edge of the picture for each sample; see `associate`."""
+    view = state.view
+    return associate(
+        view.position_m,
+        view.site_to_camera,
+        view.camera.matrix,
+        view.camera.distortion,
+        state.height_m,
+        samples.xy_m,
+        samples.z_share,
         samples.points_px,
         samples.normal,
-        samples.z_share,
+        samples.edge,
+        len(samples.length_px),
+        looks.offset_px,
+        looks.steepness,
+        gate_px,
     )
-    count = len(samples.length_px)
-    return *choose_edges(moved_px, samples.edge, count, looks.offset_px, looks.steepness, gate_px), jacobian
 
 
 def _support(samples: EdgeSamples, looks: Looks, residual: FloatArray, found: BoolArray) -> FloatArray:
-    count = len(samples.length_px)
-    hits = np.bincount(samples.edge, found & (np.abs(residual) <= _SUPPORT_PX + samples.doubt_px[samples.edge]), count)
-    looked = np.bincount(samples.edge, looks.inside, count)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return np.where(looked > 0, hits / looked, np.nan)
+    return support_of(residual, found, looks.inside, samples.edge, samples.doubt_px, _SUPPORT_PX)

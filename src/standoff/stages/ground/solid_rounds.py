@@ -1,16 +1,18 @@
 """The arithmetic of one round of a fit to a solid's edges, compiled: some hundred samples, and a dozen rounds a frame.
 
-Sample n lies on edge `edge[n]`, one of `count`. Lengths are px along the sample's normal.
+Sample n lies on edge `edge[n]`, one of `count`. Lengths are px along the sample's normal. Eyes are told as by
+`projection.eye_of`, samples and looks as `EdgeSamples` and `Looks` hold them.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from standoff.core.compiled import compiled, solved
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import IntArray
-from standoff.stages.ground.compiled import compiled
 from standoff.stages.ground.lines import TUKEY
+from standoff.stages.ground.projection import projected
 
 _CORRELATED = 6.0
 """Samples next to each other share blur, stains and shadows: so many count as one independent observation."""
@@ -24,6 +26,106 @@ _PATCHY_PX = 4.0
 _MIN_SCATTER_PX = 0.15
 _LEAST_SHARE = 0.35
 """An edge of which less than this share is found contributes nothing: what was found is something else."""
+
+_MIN_SAMPLES = 12
+
+
+@compiled
+def find_change(
+    residual: FloatArray,
+    found: BoolArray,
+    jacobian: FloatArray,
+    inside: BoolArray,
+    edge: IntArray,
+    doubt_px: FloatArray,
+    prior_information: FloatArray,
+    prior_pull: FloatArray,
+    most: FloatArray,
+) -> tuple[FloatArray, float]:
+    """Return the change (P,) that the edges and a prior ask for, and how far it moves a sample at most, in px.
+
+    Args:
+        residual: (N,) as `associate` returns it.
+        found: (N,).
+        jacobian: (N, P).
+        inside: (N,) whether the picture holds what was looked at.
+        edge: (N,) of each.
+        doubt_px: (count,) of the edges.
+        prior_information: (P, P).
+        prior_pull: (P,) of the prior.
+        most: (P,) that the change may be.
+
+    Returns:
+        Both NaN where there is too little to fit to.
+    """
+    size = len(most)
+    change, furthest_px = np.full(size, np.nan), 0.0
+    weight, scatter_px = weigh(residual, found, inside, edge, doubt_px)
+    believed = 0
+    for n in range(len(weight)):
+        believed += weight[n] > 0.0
+    if believed < _MIN_SAMPLES:
+        return change, np.nan
+    information, pull = normal_equations(jacobian, residual, weight, scatter_px, edge, doubt_px)
+    step = solved(information + prior_information, (pull + prior_pull).reshape(-1, 1))
+    for k in range(size):
+        if not np.isfinite(step[k, 0]):
+            return change, np.nan
+        change[k] = min(max(step[k, 0], -most[k]), most[k])
+    for n in range(len(weight)):
+        if weight[n] > 0.0:
+            moved_px = 0.0
+            for k in range(size):
+                moved_px += jacobian[n, k] * change[k]
+            furthest_px = max(furthest_px, abs(moved_px))
+    return change, furthest_px
+
+
+@compiled
+def associate(
+    position_m: FloatArray,
+    rotation: FloatArray,
+    matrix: FloatArray,
+    distortion: FloatArray,
+    height_m: float,
+    xy_m: FloatArray,
+    z_share: FloatArray,
+    samples_px: FloatArray,
+    normal: FloatArray,
+    edge: IntArray,
+    count: int,
+    offset_px: FloatArray,
+    steepness: FloatArray,
+    gate_px: float,
+) -> tuple[FloatArray, BoolArray, FloatArray]:
+    """Choose an edge of the picture for each sample, as a state expects them.
+
+    Returns:
+        (N,) distance from the state's edge to the chosen one along the normal, 0 where there is none; (N,) whether
+        there is one; (N, 9) how the state's edge moves along the normal.
+    """
+    places = np.empty((len(z_share), 3))
+    for n in range(len(z_share)):
+        places[n, 0], places[n, 1], places[n, 2] = xy_m[n, 0], xy_m[n, 1], z_share[n] * height_m
+    points_px, by_view, by_point = projected(places, position_m, rotation, matrix, distortion)
+    moved_px, jacobian = expect_edges(points_px, by_view, by_point, samples_px, normal, z_share)
+    residual, found = choose_edges(moved_px, edge, count, offset_px, steepness, gate_px)
+    return residual, found, jacobian
+
+
+@compiled
+def support_of(
+    residual: FloatArray, found: BoolArray, inside: BoolArray, edge: IntArray, doubt_px: FloatArray, near_px: float
+) -> FloatArray:
+    """Return (count,) the share of each edge's samples in the picture that are found within `near_px` and its doubt.
+
+    NaN where none lies in the picture.
+    """
+    hits, looked = np.zeros(len(doubt_px)), np.zeros(len(doubt_px))
+    for n in range(len(residual)):
+        looked[edge[n]] += inside[n]
+        hits[edge[n]] += found[n] and abs(residual[n]) <= near_px + doubt_px[edge[n]]
+    return hits / looked
 
 
 @compiled

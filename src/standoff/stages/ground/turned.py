@@ -8,6 +8,7 @@ import numpy as np
 
 from standoff.core.homography import FloatArray
 from standoff.core.pose import SHIFT, View
+from standoff.stages.ground.projection import project
 from standoff.stages.ground.shape import ReferenceShape
 from standoff.stages.ground.solid import STATE, SolidState
 from standoff.stages.ground.solid_fit import Belief
@@ -56,7 +57,7 @@ def doubt_between(belief: Belief, alternatives: Sequence[Belief], shape: Referen
 
 
 def _corner_px(state: SolidState, shape: ReferenceShape) -> FloatArray:
-    return np.asarray(state.view.project(np.array([[*shape.corners_m[0], state.height_m]]))[0])
+    return np.asarray(project(state.view, np.array([[*shape.corners_m[0], state.height_m]]))[0])
 
 
 def _turned(belief: Belief, shape: ReferenceShape, turn: int) -> Belief:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass, field
+from statistics import median
 
 import numpy as np
 
@@ -59,7 +60,7 @@ class Breaks:
         now, before = (frame.index, frame.time_s), self._before
         if before is not None:
             step_s = now[1] - before[1]
-            usual_s = float(np.median(self._steps_s)) if self._steps_s else np.inf
+            usual_s = median(self._steps_s) if self._steps_s else np.inf
             if step_s > max(_LEAST_JUMP_S, _JUMP_STEPS * usual_s):
                 self._add(JUMPED, before, now)
             elif step_s > 0.0:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,7 +15,8 @@ from standoff.stages.motion.lens import Lens
 from standoff.stages.motion.movers import inside
 from standoff.stages.motion.params import MotionParams
 from standoff.stages.motion.picture import FollowedPicture
-from standoff.stages.motion.plane import MIN_PAIRS, PlaneMotion, fit_plane
+from standoff.stages.motion.plane import PlaneMotion, fit_plane
+from standoff.stages.motion.plane_rounds import MIN_PAIRS, expect_points
 
 _MORE = 4
 _TRUST_STEP = 0.25
@@ -176,11 +178,8 @@ class Keyframe:
             step: (3, 3) from the one before that to the picture before; None if unknown.
             ratio: How many times that step.
         """
-        last, _ = homography.apply(pose, self._points.ideal_px)
-        if step is None:
-            return last
-        earlier, valid = homography.apply(homography.invert(step), last)
-        return np.where(valid[:, None], last + ratio * (last - earlier), last)
+        back = np.eye(3) if step is None else homography.invert(step)
+        return expect_points(self._points.ideal_px, pose, back, ratio)
 
     def is_worn_out(self, match: Match, centre_px: FloatArray) -> bool:
         """Say whether the view has changed so much since the keyframe that a new one is due.
@@ -195,14 +194,11 @@ class Keyframe:
             return True
         if match.inliers < _FEWER_INLIERS * self._first_inliers:
             return True
-        jacobian = homography.point_jacobian(match.plane.matrix, centre_px)[0]
-        if not np.isfinite(jacobian).all():
-            return True
-        left, scales, right = np.linalg.svd(jacobian)
-        turn = left @ right
-        turned_deg = abs(np.degrees(np.arctan2(turn[1, 0], turn[0, 0])))
-        return bool(
-            turned_deg > params.max_turn_deg or scales[0] > params.max_scale or scales[1] < 1.0 / params.max_scale
+        turned_rad, grown, shrunk = _turn_and_scales(match.plane.matrix, centre_px)
+        return not (
+            abs(turned_rad) <= np.deg2rad(params.max_turn_deg)
+            and grown <= params.max_scale
+            and shrunk >= 1.0 / params.max_scale
         )
 
     def _agreed(self, points: _Points, picture: FollowedPicture, found: _Found) -> Match | None:
@@ -232,7 +228,7 @@ class Keyframe:
             in_view=found.in_view,
             inliers=inliers,
             noise_px=_noise_px(changed),
-            surprise_px=float(np.median(found.off_px[plane.inlier])),
+            surprise_px=_median(found.off_px[plane.inlier]),
             seen_px=(self.picture.to_full(points.small_px[which]), found.target_px),
         )
 
@@ -250,7 +246,26 @@ def _is_spread(small_px: FloatArray, picture: FollowedPicture) -> bool:
     height, width = picture.gray.shape
     # Without distortion a point may lie a little outside.
     cell = np.clip(small_px / np.array([width, height]) * _CELLS, 0, np.array(_CELLS) - 1).astype(np.int64)
-    return len(np.unique(cell[:, 1] * _CELLS[0] + cell[:, 0])) >= _LEAST_CELLS
+    return np.count_nonzero(np.bincount(cell[:, 1] * _CELLS[0] + cell[:, 0])) >= _LEAST_CELLS
+
+
+def _turn_and_scales(matrix: FloatArray, point_px: FloatArray) -> tuple[float, float, float]:
+    """Return by what a homography turns the picture at a point (2,), and its largest and smallest scale there.
+
+    The turn is that of the nearest rotation. NaN beyond the horizon, and where the picture is mirrored.
+    """
+    jacobian = homography.point_jacobian(matrix, point_px)[0]
+    (a, b), (c, d) = jacobian.tolist()
+    alike, unlike = math.hypot(a + d, c - b) / 2.0, math.hypot(a - d, b + c) / 2.0
+    if not alike > unlike:
+        return math.nan, math.nan, math.nan
+    return math.atan2(c - b, a + d), alike + unlike, alike - unlike
+
+
+def _median(values: FloatArray) -> float:
+    """Return the median of (N,), N >= 1, none of them NaN; of so few values sorting is quicker than `np.median`."""
+    ordered = np.sort(values)
+    return float(ordered[(len(ordered) - 1) // 2] + ordered[len(ordered) // 2]) / 2.0
 
 
 def _noise_px(changed_px: FloatArray) -> float:
@@ -261,4 +276,4 @@ def _noise_px(changed_px: FloatArray) -> float:
     """
     length = np.hypot(changed_px[:, 0], changed_px[:, 1])
     length = length[np.isfinite(length)]
-    return float(np.median(length)) / 1.177 if len(length) >= MIN_PAIRS else np.nan
+    return _median(length) / 1.177 if len(length) >= MIN_PAIRS else np.nan

@@ -10,7 +10,7 @@ from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import Detections
 from standoff.stages.motion.params import MotionParams
 
-_FIXED = class_ids(Role.REFERENCE)
+_FIXED = np.array(class_ids(Role.REFERENCE))
 
 
 class Movers:
@@ -39,7 +39,7 @@ class Movers:
         """
         params = self._params
         if len(detections):
-            moves = ~np.isin(detections.class_id, _FIXED) & (detections.score >= params.mover_score)
+            moves = (detections.class_id[:, None] != _FIXED).all(axis=1) & (detections.score >= params.mover_score)
             self._xyxy_px, self._seen_s = detections.xyxy_px[moves], time_s
             self._fresh = True
         else:

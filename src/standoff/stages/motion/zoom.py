@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from standoff.core import homography
 from standoff.core.homography import FloatArray
 
 _LEAST_GROWTH = 0.05
@@ -42,12 +41,13 @@ class ZoomWatch:
             elapsed_s: Seconds between the two.
             size_px: (width, height) of the frames.
         """
-        jacobian = homography.point_jacobian(step, _SAMPLES * size_px)
-        determinant = np.linalg.det(jacobian)
-        if elapsed_s <= 0.0 or not (determinant > 0.0).all():
+        w = _SAMPLES @ (step[2, :2] * size_px) + step[2, 2]
+        whole = float(np.linalg.det(step))
+        if elapsed_s <= 0.0 or whole <= 0.0 or not (w > 0.0).all():
             self.reset()
             return False
-        growth = np.log(determinant) / 2.0
+        # The determinant of a homography's derivative is its own, over the cube of its denominator.
+        growth = np.log(whole / w**3) / 2.0
         mean = float(growth.mean())
         quick = abs(mean) > self._rate * elapsed_s
         even = float(np.ptp(growth)) < _LEAST_UNEVEN * abs(mean)

@@ -6,7 +6,7 @@ import sys
 PROGRAM = """
 from numba.core import caching
 caching.CacheImpl._locator_classes = []
-from standoff.stages.ground.compiled import compiled
+from standoff.core.compiled import compiled
 
 @compiled
 def ratio(a: float, b: float) -> float:

@@ -1,0 +1,65 @@
+"""Loops compiled by numba, kept on disk between runs where there is a folder to keep them in.
+
+What is to be compiled is written in loops over numbers: slices, masks and numpy's linear algebra take many seconds to
+compile, which whoever runs a new installation waits for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import ParamSpec, TypeVar
+
+from numba import njit
+
+from standoff.core.homography import FloatArray
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+def compiled(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile a function of numbers and arrays at its first call; division by zero gives infinity, as in numpy.
+
+    Without a folder that can be written to (a read-only container) it is compiled anew in every process.
+    """
+    try:
+        cached: Callable[P, R] = njit(cache=True, error_model="numpy")(function)
+    except RuntimeError:
+        cached = njit(error_model="numpy")(function)
+    return cached
+
+
+@compiled
+def solved(matrix: FloatArray, right: FloatArray) -> FloatArray:
+    """Solve some linear equations with one matrix, by elimination with pivots.
+
+    Args:
+        matrix: (N, N), of a few rows.
+        right: (N, M) right-hand sides.
+
+    Returns:
+        (N, M); not finite where the matrix is singular.
+    """
+    size, columns = right.shape
+    left, right = matrix.copy(), right.copy()
+    for k in range(size):
+        pivot = k
+        for row in range(k + 1, size):
+            if abs(left[row, k]) > abs(left[pivot, k]):
+                pivot = row
+        for column in range(size):
+            left[k, column], left[pivot, column] = left[pivot, column], left[k, column]
+        for column in range(columns):
+            right[k, column], right[pivot, column] = right[pivot, column], right[k, column]
+        for row in range(k + 1, size):
+            factor = left[row, k] / left[k, k]
+            for column in range(k, size):
+                left[row, column] -= factor * left[k, column]
+            for column in range(columns):
+                right[row, column] -= factor * right[k, column]
+    for column in range(columns):
+        for row in range(size - 1, -1, -1):
+            for k in range(row + 1, size):
+                right[row, column] -= left[row, k] * right[k, column]
+            right[row, column] /= left[row, row]
+    return right
