@@ -91,7 +91,16 @@ class ReferenceLandmarks:
         held = belief.by_landmark and moment.held
         telemetry = moment.frame.telemetry if self._telemetry else None
         agrees = None if telemetry is None else partial(agrees_with_telemetry, telemetry=telemetry)
-        found = solid.search(moment.gray, time_s, moment.detections, belief.lens, held=held, taken=taken, agrees=agrees)
+        found = solid.search(
+            moment.gray,
+            moment.frame.picture,
+            time_s,
+            moment.detections,
+            belief.lens,
+            held=held,
+            taken=taken,
+            agrees=agrees,
+        )
         if isinstance(found, NoGroundMap):
             if found.reason == NOT_THERE:
                 self._doubt_lens(moment, belief, solid)

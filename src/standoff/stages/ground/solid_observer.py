@@ -11,7 +11,7 @@ import numpy as np
 from standoff.core.camera import CameraPrior
 from standoff.core.homography import FloatArray
 from standoff.core.pose import View
-from standoff.core.types import Detections, ImageArray, Luma, NoGroundMap
+from standoff.core.types import Detections, ImageArray, Luma, NoGroundMap, Picture
 from standoff.stages.ground.params import ReferenceParams
 from standoff.stages.ground.placement import Placement, Through
 from standoff.stages.ground.pose_filter import Estimate
@@ -20,6 +20,7 @@ from standoff.stages.ground.shape import ReferenceShape
 from standoff.stages.ground.solid import HEIGHT, SolidState
 from standoff.stages.ground.solid_choice import Found
 from standoff.stages.ground.solid_fit import Belief, fit_solid
+from standoff.stages.ground.solid_foot import with_foot
 from standoff.stages.ground.solid_search import HeightPrior, search_solid
 from standoff.stages.ground.turned import turned_like
 from standoff.stages.ground.where import NOT_SEEN, GivenPlace, detected_box
@@ -186,6 +187,7 @@ class SolidObserver:
     def search(
         self,
         gray: ImageArray,
+        picture: Picture,
         time_s: float,
         detections: Detections,
         camera: CameraPrior,
@@ -198,6 +200,7 @@ class SolidObserver:
 
         Args:
             gray: (H, W).
+            picture: The same in colour, for the height where that was not measured.
             time_s: Of the frame.
             detections: Of this frame.
             camera: What is known of the lens.
@@ -217,6 +220,8 @@ class SolidObserver:
         if self._remember and self._searched is not None and 0.0 <= time_s - self._searched[0] < again_s:
             return self._searched[1]
         found = search_solid(gray, box, self.reference.shape, camera, self.height, agrees)
+        if isinstance(found, Found) and self.reference.height_m is None:
+            found = with_foot(found, gray, picture.bgr(), self.reference.shape)
         self._searched = (time_s, NoGroundMap(NOT_DUE) if isinstance(found, Found) else found)
         return found
 

@@ -14,10 +14,13 @@ import cv2
 import numpy as np
 
 from standoff.core.homography import FloatArray
+from standoff.core.pose import View
 from standoff.core.types import ImageArray
 from standoff.stages.ground.projection import project
 from standoff.stages.ground.shape import ReferenceShape
-from standoff.stages.ground.solid import SolidState, facing_sides
+from standoff.stages.ground.solid import HEIGHT, SolidState, facing_sides
+from standoff.stages.ground.solid_choice import Found
+from standoff.stages.ground.solid_fit import Belief, fit_solid
 
 _HIGHEST_M: Final = 1.5
 _STEP_M: Final = 0.03
@@ -48,6 +51,8 @@ _SIGMA_WIDTHS: Final = 0.4
 
 _LEAST_SIGMA_M: Final = 0.05
 _MOST_SIGMA_M: Final = 0.2
+_FIT_PX: Final = 5.0
+_SIGMAS: Final = 3.0
 _DARK: Final = 12.0
 """Grey levels that keep the hues of dark pixels, which are noise, near zero."""
 
@@ -56,6 +61,54 @@ _NO_HUE: Final = 128.0
 _SMOOTH_PX: Final = 1.0
 _MARGIN_PX: Final = 4
 _NOISE: Final = 0.3
+
+
+def with_foot(found: Found, gray: ImageArray, bgr: ImageArray, shape: ReferenceShape) -> Found:
+    """Look for the foot of a solid of unknown height, and fit the solid again with what that says of its height.
+
+    Args:
+        found: By its edges.
+        gray: (H, W).
+        bgr: (H, W, 3) the same picture.
+        shape: Of the solid.
+
+    Returns:
+        What was found, as it was where no foot is seen.
+    """
+    foot = height_by_hue(bgr, shape, found.fit.state)
+    if foot is None:
+        return found
+    height_m, sigma_m = foot
+    prior = _with_height(found.prior, height_m, sigma_m)
+    fit = fit_solid(gray, shape, prior, _FIT_PX, start=_raised(found.fit.state, height_m))
+    if fit is None:
+        return found
+    alternatives = tuple(
+        _with_height(other, height_m, sigma_m)
+        for other in found.alternatives
+        if abs(other.state.height_m - height_m) <= _SIGMAS * np.hypot(sigma_m, _height_sigma_m(other))
+    )
+    return Found(fit, prior, alternatives)
+
+
+def _with_height(belief: Belief, height_m: float, sigma_m: float) -> Belief:
+    """Return a belief after the height was measured."""
+    information = belief.information.copy()
+    information[HEIGHT, HEIGHT] += sigma_m**-2
+    pull = np.zeros(len(information))
+    pull[HEIGHT] = (height_m - belief.state.height_m) / sigma_m**2
+    return Belief(belief.state.changed(np.linalg.solve(information, pull)), information)
+
+
+def _height_sigma_m(belief: Belief) -> float:
+    return float(np.sqrt(np.linalg.inv(belief.information)[HEIGHT, HEIGHT]))
+
+
+def _raised(state: SolidState, height_m: float) -> SolidState:
+    """Return the solid with another height and its upper edges where they were."""
+    view = state.view
+    up_m = np.array([0.0, 0.0, height_m - state.height_m])
+    return SolidState(View(view.camera, view.position_m + up_m, view.site_to_camera), height_m)
 
 
 def height_by_hue(bgr: ImageArray, shape: ReferenceShape, state: SolidState) -> tuple[float, float] | None:
