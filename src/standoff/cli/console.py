@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -60,19 +59,10 @@ def print_table(
 
 
 def progress_bar(*, quiet: bool, unit: str = "frames") -> Progress:
-    """Return a progress bar on standard error with rate and time left; silent when quiet or not a terminal."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+    """Return a progress bar on standard error with rate and time left; a line a minute where that is no terminal."""
+    from standoff.cli.spoken_progress import SpokenProgress
 
-    return Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn(unit + "  {task.fields[rate]:.1f} a second"),
-        TimeRemainingColumn(),
-        console=Console(stderr=True),
-        disable=quiet or not sys.stderr.isatty(),
-    )
+    return SpokenProgress(unit, quiet=quiet)
 
 
 @contextmanager
