@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from standoff.core.camera import Camera
-from standoff.core.homography import FloatArray
 from standoff.core.compiled import compiled
+from standoff.core.homography import FloatArray
 from standoff.stages.ground.quadrilateral import ORDERS
 from standoff.stages.ground.shape import ReferenceShape
 

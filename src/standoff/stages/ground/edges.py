@@ -14,9 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from standoff.core.camera import Camera
+from standoff.core.compiled import compiled
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import ImageArray
-from standoff.core.compiled import compiled
 
 _FILTER_MARGIN_PX = 5
 """Three pixels of Gaussian, one of Sobel, one of non-maximum suppression."""

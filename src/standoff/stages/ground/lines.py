@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from standoff.core.compiled import compiled
 from standoff.core.homography import FloatArray
 from standoff.core.types import IntArray
-from standoff.core.compiled import compiled
 
 CONTOURS = 4
 

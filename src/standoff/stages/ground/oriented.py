@@ -15,9 +15,9 @@ from itertools import combinations
 import cv2
 import numpy as np
 
+from standoff.core.compiled import compiled
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import IntArray, NoGroundMap
-from standoff.core.compiled import compiled
 from standoff.stages.ground.edges import Edges, Gradients
 from standoff.stages.ground.lines import fit_line_robustly
 from standoff.stages.ground.quadrilateral import NO_QUADRILATERAL, ORDERS, WALKS, crossings, join_lines, walk_around

@@ -58,7 +58,9 @@ def map_from_view(
 
 
 @compiled
-def _entries_with_jacobian(forth: FloatArray, rotation: FloatArray, camera: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _entries_with_jacobian(
+    forth: FloatArray, rotation: FloatArray, camera: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Return the signed map from undistorted pixels to the ground, at unit norm, and its derivative by the view.
 
     Args:

@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from standoff.core.compiled import compiled
 from standoff.core.homography import FloatArray
 from standoff.core.pose import CHANGES, View
-from standoff.core.compiled import compiled
-
 
 _UNDISTORT_ITERATIONS, _UNDISTORT_TOLERANCE, _UNDISTORTED = 50, 1e-12, 1e-9
 """Of Newton's method as in `Camera.undistort`, in normalised coordinates."""
@@ -40,19 +39,6 @@ def project(view: View, points_m: FloatArray) -> FloatArray:
         (N, 2) pixels, in or outside the picture; NaN behind the camera or outside the lens model.
     """
     return seen(np.ascontiguousarray(points_m), *eye_of(view))
-
-
-def to_plane(view: View, points_px: FloatArray) -> FloatArray:
-    """Intersect the rays of picture points with the ground z = 0, as `View.to_plane`.
-
-    Args:
-        view: The camera.
-        points_px: (N, 2), as seen in the picture.
-
-    Returns:
-        (N, 2) x east, y north; NaN where the ray does not meet the ground in front of the camera.
-    """
-    return on_ground(np.ascontiguousarray(points_px), *eye_of(view))
 
 
 def project_with_jacobians(view: View, points_m: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -142,7 +128,7 @@ def on_ground(
     distortion: FloatArray,
     first_fold_r2: float,
 ) -> FloatArray:
-    """Return what `to_plane` does."""
+    """Return (N, 2) where rays of picture points (N, 2) meet the ground z = 0, as `View.to_plane`; NaN where none."""
     places = np.full((len(points_px), 2), np.nan)
     straight, ray = np.empty(2), np.empty(3)
     for n in range(len(points_px)):

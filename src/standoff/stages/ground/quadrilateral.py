@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from standoff.core.compiled import compiled
 from standoff.core.homography import FloatArray
 from standoff.core.types import IntArray, NoGroundMap
-from standoff.core.compiled import compiled
 
 NO_QUADRILATERAL = "the contours make no convex quadrilateral"
 OUTSIDE_BOX = "a corner lies outside the reference's box"

@@ -8,9 +8,9 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from standoff.core.compiled import compiled
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import Luma
-from standoff.core.compiled import compiled
 from standoff.stages.ground.edges import interpolated
 from standoff.stages.ground.solid import EdgeSamples
 

@@ -12,7 +12,14 @@ from standoff.stages.ground.projection import project
 from standoff.stages.ground.shape import ReferenceShape
 from standoff.stages.ground.solid import EdgeSamples, SolidState, sample_edges
 from standoff.stages.ground.solid_edges import Blurred, Looks, look_across
-from standoff.stages.ground.solid_rounds import associate, edge_medians, find_change, normal_equations, support_of, weigh
+from standoff.stages.ground.solid_rounds import (
+    associate,
+    edge_medians,
+    find_change,
+    normal_equations,
+    support_of,
+    weigh,
+)
 
 _ROUNDS, _SETTLED_ROUNDS = 4, 2
 _STILL_PX = 0.01

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from standoff.core.compiled import compiled, solved
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import IntArray
-from standoff.core.compiled import compiled, solved
 from standoff.stages.ground.lines import TUKEY
 from standoff.stages.ground.projection import projected
 

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from standoff.core.compiled import compiled
 from standoff.core.homography import FloatArray
 from standoff.core.types import IntArray
-from standoff.core.compiled import compiled
 from standoff.stages.ground.projection import seen
 
 _STEP_PX = 1.5
@@ -110,9 +110,7 @@ def put_samples(
     matrix: FloatArray,
     distortion: FloatArray,
     first_fold_r2: float,
-) -> tuple[
-    FloatArray, FloatArray, IntArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, IntArray
-]:
+) -> tuple[FloatArray, FloatArray, IntArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, IntArray]:
     """Return what `solid.EdgeSamples` holds, in its order."""
     edges, doubt_px, lower_side = find_visible(
         corners, height_m, position_m, rotation, matrix, distortion, first_fold_r2

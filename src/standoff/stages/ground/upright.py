@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from standoff.core.compiled import compiled
 from standoff.core.homography import FloatArray
 from standoff.core.types import IntArray
-from standoff.core.compiled import compiled
 
 _LOWEST_SLOPE = 0.02
 """A ray that falls less than this, or rises, is taken to fall so much: the body is then too far away to fit."""

@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from standoff.core.compiled import compiled
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import IntArray
-from standoff.core.compiled import compiled
 from standoff.stages.ground.lines import facing, fit_line
 
 _STEPS = 360
