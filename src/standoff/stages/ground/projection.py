@@ -188,7 +188,8 @@ def _straighten(x: float, y: float, distortion: FloatArray, first_fold_r2: float
     determinant = slope[0, 0] * slope[1, 1] - slope[0, 1] * slope[1, 0]
     unfolded = determinant > 0.0 and slope[0, 0] + slope[1, 1] > 0.0
     unfolded = unfolded and straight[0] ** 2 + straight[1] ** 2 < first_fold_r2
-    return unfolded and max(abs(bent[0] - x), abs(bent[1] - y)) < _UNDISTORTED
+    found: bool = unfolded and max(abs(bent[0] - x), abs(bent[1] - y)) < _UNDISTORTED
+    return found
 
 
 @compiled
