@@ -3,6 +3,12 @@ from __future__ import annotations
 import subprocess
 import sys
 
+import numpy as np
+import pytest
+from tolerances import GEOMETRY_REL
+
+from standoff.core.compiled import solved
+
 PROGRAM = """
 from numba.core import caching
 caching.CacheImpl._locator_classes = []
@@ -20,3 +26,17 @@ assert ratio(1.0, 0.0) == float("inf")
 def test_without_a_folder_for_compiled_code_it_is_compiled_anew() -> None:
     done = subprocess.run([sys.executable, "-c", PROGRAM], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("size", [2, 6, 9])
+def test_linear_equations_are_solved_as_by_numpy(size: int) -> None:
+    rng = np.random.default_rng(size)
+    matrix, right = rng.normal(size=(size, size)), rng.normal(size=(size, 3))
+    np.testing.assert_allclose(solved(matrix, right), np.linalg.solve(matrix, right), rtol=GEOMETRY_REL)
+    # Nothing to divide by without pivots.
+    np.fill_diagonal(matrix, 0.0)
+    np.testing.assert_allclose(solved(matrix, right), np.linalg.solve(matrix, right), rtol=GEOMETRY_REL)
+
+
+def test_a_singular_matrix_solves_nothing() -> None:
+    assert not np.isfinite(solved(np.ones((2, 2)), np.eye(2))).all()

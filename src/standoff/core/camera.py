@@ -38,7 +38,7 @@ class Camera:
         distortion = np.array(self.distortion, dtype=np.float64).ravel()
         if matrix.shape != (3, 3) or distortion.shape != (5,):
             raise ValueError(f"matrix must be (3, 3), distortion (5,), not {matrix.shape} and {distortion.shape}")
-        if not (np.isfinite(matrix).all() and np.isfinite(distortion).all()):
+        if not all(map(math.isfinite, [*matrix.ravel().tolist(), *distortion.tolist()])):
             raise ValueError("camera matrix and distortion must be finite")
         if matrix[0, 0] <= 0 or matrix[1, 1] <= 0:
             raise ValueError("focal lengths must be positive")
@@ -65,10 +65,11 @@ class Camera:
 
     def refocused(self, focal_factor: float, k1: float) -> Camera:
         """Return the same camera with both focal lengths times a factor and another first radial coefficient."""
-        matrix = self.matrix.copy()
+        matrix, distortion = self.matrix.copy(), self.distortion.copy()
         matrix[0, 0] *= focal_factor
         matrix[1, 1] *= focal_factor
-        return Camera(self.width_px, self.height_px, matrix, np.array([k1, *self.distortion[1:]]))
+        distortion[0] = k1
+        return Camera(self.width_px, self.height_px, matrix, distortion)
 
     def _to_normalised(self, points_px: FloatArray) -> FloatArray:
         focal = np.array([self.matrix[0, 0], self.matrix[1, 1]])

@@ -40,13 +40,25 @@ def solved(matrix: FloatArray, right: FloatArray) -> FloatArray:
     Returns:
         (N, M); not finite where the matrix is singular.
     """
-    size, columns = right.shape
     left, right = matrix.copy(), right.copy()
+    _eliminate(left, right)
+    size, columns = right.shape
+    for column in range(columns):
+        for row in range(size - 1, -1, -1):
+            for k in range(row + 1, size):
+                right[row, column] -= left[row, k] * right[k, column]
+            right[row, column] /= left[row, row]
+    return right
+
+
+@compiled
+def _eliminate(left: FloatArray, right: FloatArray) -> None:
+    """Make the left side (N, N) of linear equations upper triangular, and the right one (N, M) accordingly."""
+    size, columns = right.shape
     for k in range(size):
         pivot = k
         for row in range(k + 1, size):
-            if abs(left[row, k]) > abs(left[pivot, k]):
-                pivot = row
+            pivot = row if abs(left[row, k]) > abs(left[pivot, k]) else pivot
         for column in range(size):
             left[k, column], left[pivot, column] = left[pivot, column], left[k, column]
         for column in range(columns):
@@ -57,9 +69,3 @@ def solved(matrix: FloatArray, right: FloatArray) -> FloatArray:
                 left[row, column] -= factor * left[k, column]
             for column in range(columns):
                 right[row, column] -= factor * right[k, column]
-    for column in range(columns):
-        for row in range(size - 1, -1, -1):
-            for k in range(row + 1, size):
-                right[row, column] -= left[row, k] * right[k, column]
-            right[row, column] /= left[row, row]
-    return right

@@ -148,8 +148,9 @@ class View:
         """Return the view after a change of eight parameters (see the module's head)."""
         change = np.asarray(change, dtype=np.float64)
         camera = self.camera
-        if change[LENS].any():
-            camera = camera.refocused(float(np.exp(change[6])), float(camera.distortion[0] + change[7]))
+        log_focal, k1 = change[LENS].tolist()
+        if log_focal or k1:
+            camera = camera.refocused(math.exp(log_focal), float(camera.distortion[0]) + k1)
         turned = rotation_from_vector(change[TURN]) @ self.site_to_camera
         # Many small turns in a row must remain a rotation: a Newton step to the nearest one doubles the right digits.
         turned = 1.5 * turned - 0.5 * turned @ turned.T @ turned
@@ -157,16 +158,12 @@ class View:
 
     def change_from(self, other: View) -> FloatArray:
         """Return the change (8,) that leads from another view to this one."""
-        return np.concatenate(
-            [
-                vector_from_rotation(self.site_to_camera @ other.site_to_camera.T),
-                self.position_m - other.position_m,
-                [
-                    np.log(self.camera.matrix[0, 0] / other.camera.matrix[0, 0]),
-                    self.camera.distortion[0] - other.camera.distortion[0],
-                ],
-            ]
-        )
+        change = np.empty(CHANGES)
+        change[TURN] = vector_from_rotation(self.site_to_camera @ other.site_to_camera.T)
+        change[SHIFT] = self.position_m - other.position_m
+        change[6] = math.log(self.camera.matrix[0, 0] / other.camera.matrix[0, 0])
+        change[7] = self.camera.distortion[0] - other.camera.distortion[0]
+        return change
 
     def project_with_jacobians(self, points_m: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Project points, and say how their pictures move with the view and with the points.
@@ -254,7 +251,7 @@ def vector_from_rotation(rotation: FloatArray) -> FloatArray:
 def _is_rotation(matrix: FloatArray) -> bool:
     """Return whether the rows of (3, 3) are unit vectors at right angles, right-handed; numpy would take longer."""
     (a, b, c), (d, e, f), (g, h, i) = matrix.tolist()
-    return (
+    return bool(
         abs(a * a + b * b + c * c - 1.0) <= _MAX_STRETCH
         and abs(d * d + e * e + f * f - 1.0) <= _MAX_STRETCH
         and abs(g * g + h * h + i * i - 1.0) <= _MAX_STRETCH

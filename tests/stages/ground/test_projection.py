@@ -8,7 +8,7 @@ from tolerances import GEOMETRY_REL
 from standoff.core.camera import Camera
 from standoff.core.homography import FloatArray
 from standoff.core.pose import View
-from standoff.stages.ground.projection import project, project_with_jacobians
+from standoff.stages.ground.projection import eye_of, on_ground, project, project_with_jacobians, turned_by
 
 LENSES = {
     "none": (0.0, 0.0, 0.0, 0.0, 0.0),
@@ -51,3 +51,20 @@ def test_no_points_have_no_picture() -> None:
     view = _view("barrel")
     assert project(view, np.zeros((0, 3))).shape == (0, 2)
     assert [len(one) for one in project_with_jacobians(view, np.zeros((0, 3)))] == [0, 0, 0]
+
+
+@pytest.mark.parametrize("name", LENSES)
+def test_compiled_rays_meet_the_ground_where_the_view_s_do(name: str) -> None:
+    view = _view(name)
+    size_px = np.array([view.camera.width_px, view.camera.height_px])
+    points_px = np.random.default_rng(1).uniform(-3.0, 4.0, (400, 2)) * size_px
+    expected_m = view.to_plane(points_px)
+    assert 0 < np.isfinite(expected_m[:, 0]).sum() < len(points_px)
+    np.testing.assert_allclose(on_ground(points_px, *eye_of(view)), expected_m, rtol=1e-6)
+
+
+@pytest.mark.parametrize("angle_rad", [0.0, 1e-9, 0.02, 2.5])
+def test_a_compiled_turn_is_the_view_s_own(angle_rad: float) -> None:
+    view, axis = _view("none"), np.array([0.6, -0.48, 0.64])
+    expected = view.changed(np.append(angle_rad * axis, np.zeros(5))).site_to_camera
+    np.testing.assert_allclose(turned_by(angle_rad * axis, view.site_to_camera), expected, atol=GEOMETRY_REL)

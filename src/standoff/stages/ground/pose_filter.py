@@ -8,6 +8,7 @@ other see the same edges with the same stains and the same light: the observatio
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -34,7 +35,7 @@ _FLIGHT_MPS, _FLIGHT_RADPS = 5.0, 0.6
 _TIME_SLACK_S = 1e-6
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Estimate:
     """The state at one time.
 
@@ -48,14 +49,19 @@ class Estimate:
     covariance: FloatArray
     lasting: FloatArray
 
-    @property
+    @cached_property
     def total(self) -> FloatArray:
         """(9, 9) covariance of everything."""
         return self.covariance + self.lasting
 
+    @cached_property
+    def information(self) -> FloatArray:
+        """(9, 9) inverse of `covariance`."""
+        return _inverse(self.covariance)
+
     def belief(self) -> Belief:
         """Return it as a prior for a fit."""
-        return Belief(self.state, _inverse(self.covariance))
+        return Belief(self.state, self.information)
 
 
 _Keyframe = tuple[Estimate | None, float, CameraMotion | NoCameraMotion]
@@ -179,7 +185,7 @@ class PoseFilter:
         assert self._key is not None and self._now is not None
         since_s = self._now_s - self._observed_s.get(by, -np.inf)
         fresh = min(max(since_s / self._same_s, 0.0), 1.0)
-        before = _inverse(self._now.covariance)
+        before = self._now.information
         pull = (before + information) @ state.change_from(self._now.state)
         self._offer_lasting(before, information, by)
         self._absorb(before, fresh * information, fresh * pull)

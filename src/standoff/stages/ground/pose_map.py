@@ -163,7 +163,8 @@ def _length_sigma(
             for k in range(CHANGES):
                 variance += longer[i] * covariance[i, k] * longer[k]
         worst = max(worst, variance)
-    return np.sqrt(worst)
+    sigma: float = np.sqrt(worst)
+    return sigma
 
 
 def middle_scale_m_per_px(view: View) -> float:

@@ -41,19 +41,6 @@ def project(view: View, points_m: FloatArray) -> FloatArray:
     return seen(np.ascontiguousarray(points_m), *eye_of(view))
 
 
-def to_plane(view: View, points_px: FloatArray) -> FloatArray:
-    """Intersect the rays of picture points with the ground z = 0, as `View.to_plane`.
-
-    Args:
-        view: The camera.
-        points_px: (N, 2), as seen in the picture.
-
-    Returns:
-        (N, 2) x east, y north; NaN where the ray does not meet the ground in front of the camera.
-    """
-    return on_ground(np.ascontiguousarray(points_px), *eye_of(view))
-
-
 def project_with_jacobians(view: View, points_m: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Project points, and say how their pictures move, as `View.project_with_jacobians`.
 
@@ -141,7 +128,7 @@ def on_ground(
     distortion: FloatArray,
     first_fold_r2: float,
 ) -> FloatArray:
-    """Return what `to_plane` does."""
+    """Return (N, 2) where rays of picture points (N, 2) meet the ground z = 0, as `View.to_plane`; NaN where none."""
     places = np.full((len(points_px), 2), np.nan)
     straight, ray = np.empty(2), np.empty(3)
     for n in range(len(points_px)):
@@ -201,7 +188,8 @@ def _straighten(x: float, y: float, distortion: FloatArray, first_fold_r2: float
     determinant = slope[0, 0] * slope[1, 1] - slope[0, 1] * slope[1, 0]
     unfolded = determinant > 0.0 and slope[0, 0] + slope[1, 1] > 0.0
     unfolded = unfolded and straight[0] ** 2 + straight[1] ** 2 < first_fold_r2
-    return unfolded and max(abs(bent[0] - x), abs(bent[1] - y)) < _UNDISTORTED
+    found: bool = unfolded and max(abs(bent[0] - x), abs(bent[1] - y)) < _UNDISTORTED
+    return found
 
 
 @compiled

@@ -138,6 +138,12 @@ class ReferenceShape:
         lengths: FloatArray = np.linalg.norm(np.roll(self.corners_m, -1, axis=0) - self.corners_m, axis=1)
         return lengths
 
+    def at_height(self, height_m: float) -> FloatArray:
+        """Return (N, 3) the corners on a level plane."""
+        places = np.empty((len(self.corners_m), 3))
+        places[:, :2], places[:, 2] = self.corners_m, height_m
+        return places
+
     def turns_onto_itself(self) -> tuple[int, ...]:
         """Return the cyclic shifts of the corners that change no distance: (0, 1, 2, 3) for a square.
 

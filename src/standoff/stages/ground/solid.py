@@ -38,7 +38,9 @@ class SolidState:
 
     def change_from(self, other: SolidState) -> FloatArray:
         """Return the change (9,) that leads from another state to this one."""
-        return np.append(self.view.change_from(other.view), self.height_m - other.height_m)
+        change = np.empty(STATE)
+        change[:CHANGES], change[HEIGHT] = self.view.change_from(other.view), self.height_m - other.height_m
+        return change
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -104,4 +104,4 @@ def _orders(shape: ReferenceShape) -> IntArray:
 
 def upper_px(state: SolidState, shape: ReferenceShape) -> FloatArray:
     """Return (N, 2) where the upper corners appear."""
-    return project(state.view, np.column_stack([shape.corners_m, np.full(len(shape.corners_m), state.height_m)]))
+    return project(state.view, shape.at_height(state.height_m))

@@ -291,8 +291,7 @@ class SolidObserver:
         return outline
 
     def _corners_m(self, own: SolidState) -> FloatArray:
-        corners_m = self.reference.shape.corners_m
-        return np.column_stack([corners_m, np.full(len(corners_m), own.height_m)])
+        return self.reference.shape.at_height(own.height_m)
 
     def _outline_sigma_px(self, own: SolidState, covariance: FloatArray) -> float:
         """Return the standard error of where the upper corners should be, the worst of them."""

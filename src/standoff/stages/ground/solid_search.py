@@ -8,7 +8,7 @@ and the one wins at which the picture has most of its edges.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -144,12 +144,11 @@ def _search(task: _Task, smoothing_px: float, agrees: Callable[[Belief], bool] |
     edges = _edges(task, smoothing_px)
     if isinstance(edges, NoGroundMap):
         return edges
-    states = _by_matching(task, edges)
+    states = _scored(task, _by_matching(task, edges))
     if len(task.shape.corners_m) == 4:
         states += _by_quadrilaterals(task, edges)
-    states = _ranked(task, states)
     candidates: list[Candidate] = []
-    for state in states[: _REFINED * len(task.height.tried_m)]:
+    for state in _best(states, _REFINED * len(task.height.tried_m)):
         if sum(one.believable for one in candidates) == _REFINED:
             break
         prior = _prior(state, task.camera, task.height)
@@ -167,19 +166,28 @@ def _score_of_fit(task: _Task, fit: SolidFit) -> float:
     return _score_of(task, fit.state, fit.support, fit.length_px) - _HEIGHT_COST * off**2 * float(around_px)
 
 
-def _ranked(task: _Task, states: Sequence[SolidState]) -> list[SolidState]:
-    """Return states in the order of how much of them the picture has."""
-    scores = np.array([_score(task, state) for state in states])
-    return [states[k] for k in np.argsort(-scores, kind="stable")]
+_Scored = tuple[float, SolidState]
 
 
-def _by_quadrilaterals(task: _Task, edges: Edges) -> list[SolidState]:
+def _scored(task: _Task, states: Iterable[SolidState]) -> list[_Scored]:
+    """Say of states how much of them the picture has."""
+    return [(_score(task, state), state) for state in states]
+
+
+def _best(scored: Sequence[_Scored], count: int) -> list[SolidState]:
+    """Return so many of the states, those first of which the picture has the most."""
+    return [state for _, state in sorted(scored, key=lambda one: -one[0])[:count]]
+
+
+def _by_quadrilaterals(task: _Task, edges: Edges) -> list[_Scored]:
     """Return the states that quadrilaterals of edges speak for."""
     outlines = likely_quadrilaterals(edges, undistorted_box(task.box, task.camera.camera), _QUADRILATERALS)
     camera, heights_m = task.camera.camera, task.height.tried_m
-    states = [state for outline in outlines for state in states_of(outline, task.shape, camera, heights_m)]
-    leading = _ranked(task, states)[:_MIXED]
-    return states + [other for state in leading for other in mixed_states(state, task.shape)]
+    states = _scored(
+        task, (state for outline in outlines for state in states_of(outline, task.shape, camera, heights_m))
+    )
+    mixed = (other for state in _best(states, _MIXED) for other in mixed_states(state, task.shape))
+    return states + _scored(task, mixed)
 
 
 def _by_matching(task: _Task, edges: Edges) -> list[SolidState]:

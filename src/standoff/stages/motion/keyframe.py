@@ -246,7 +246,7 @@ def _is_spread(small_px: FloatArray, picture: FollowedPicture) -> bool:
     height, width = picture.gray.shape
     # Without distortion a point may lie a little outside.
     cell = np.clip(small_px / np.array([width, height]) * _CELLS, 0, np.array(_CELLS) - 1).astype(np.int64)
-    return np.count_nonzero(np.bincount(cell[:, 1] * _CELLS[0] + cell[:, 0])) >= _LEAST_CELLS
+    return int(np.count_nonzero(np.bincount(cell[:, 1] * _CELLS[0] + cell[:, 0]))) >= _LEAST_CELLS
 
 
 def _turn_and_scales(matrix: FloatArray, point_px: FloatArray) -> tuple[float, float, float]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from standoff.core import homography
 from standoff.core.homography import BoolArray, FloatArray
-from standoff.stages.motion.plane_rounds import MIN_PAIRS, refine
+from standoff.stages.motion.plane_rounds import MIN_PAIRS, normalised, refine
 
 _RANSAC_ROUNDS = 300
 _RANSAC_CONFIDENCE = 0.995
@@ -70,11 +70,8 @@ def fit_plane(
     start, reach_px = _consensus(source[voters], target[voters], inlier_px)
     if start is None:
         return None
-    by_source, by_target = homography.normalisation(source), homography.normalisation(target)
+    (places, by_source), (wanted, by_target) = normalised(source), normalised(target)
     unit, back = by_target[0, 0], np.linalg.inv(by_target)
-    places, wanted = (
-        np.diag(one)[:2] * points + one[:2, 2] for one, points in ((by_source, source), (by_target, target))
-    )
     begun = by_target @ start @ np.linalg.inv(by_source)
     lengths = reach_px * unit, inlier_px * unit, followed_px * unit
     agree, matrix, parameters, residual, inlier = refine(places, wanted, begun / begun[2, 2], *lengths)
@@ -102,13 +99,20 @@ def relief_covariance(plane: PlaneMotion, noise_px: float) -> FloatArray:
         noise_px: Standard error, along an axis, that following alone gives a point.
     """
     length = np.hypot(plane.residual_px[:, 0], plane.residual_px[:, 1])
-    near = plane.residual_px[length <= _RELIEF_REACH * np.quantile(length, _RELIEF_SHARE)]
+    near = plane.residual_px[length <= _RELIEF_REACH * _quantile(length, _RELIEF_SHARE)]
     excess, axes = np.linalg.eigh(near.T @ near / max(len(near), 1) - _NOISE_MARGIN * noise_px**2 * np.eye(2))
     shift = _RELIEF_PART * (axes * np.maximum(excess, 0.0)) @ axes.T + _second_shift(plane)
     by_shift = np.zeros((9, 2))
     by_shift[0:3, 0] = by_shift[3:6, 1] = plane.matrix[2]
     covariance: FloatArray = by_shift @ shift @ by_shift.T
     return covariance
+
+
+def _quantile(values: FloatArray, share: float) -> float:
+    """Return `np.quantile` of (N,), N >= 2; of so few values sorting is quicker."""
+    ordered, place = np.sort(values), share * (len(values) - 1)
+    below = int(place)
+    return float(ordered[below] + (place - below) * (ordered[below + 1] - ordered[below]))
 
 
 def _second_shift(plane: PlaneMotion) -> FloatArray:

@@ -60,6 +60,24 @@ def expect_points(points: FloatArray, pose: FloatArray, back: FloatArray, ratio:
 
 
 @compiled
+def normalised(points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return points (N, 2) in normalised coordinates, and the (3, 3) of `homography.normalisation`."""
+    count, middle, squares = len(points), np.zeros(2), 0.0
+    for n in range(count):
+        for axis in range(2):
+            middle[axis] += points[n, axis] / count
+    for n in range(count):
+        squares += (points[n, 0] - middle[0]) ** 2 + (points[n, 1] - middle[1]) ** 2
+    scale = np.sqrt(2.0 * count / squares)
+    places, similarity = np.empty((count, 2)), np.eye(3)
+    for axis in range(2):
+        similarity[axis, axis], similarity[axis, 2] = scale, -scale * middle[axis]
+        for n in range(count):
+            places[n, axis] = scale * (points[n, axis] - middle[axis])
+    return places, similarity
+
+
+@compiled
 def refine(
     places: FloatArray, wanted: FloatArray, matrix: FloatArray, reach: float, inlier: float, followed: float
 ) -> tuple[bool, FloatArray, FloatArray, FloatArray, BoolArray]:
