@@ -15,7 +15,7 @@ register_profiles()
 
 _TESTS = Path(__file__).resolve().parent
 _PROJECT = _TESTS.parent
-_COUNTED = {"core", "stages", "test_pipeline.py"}
+_COUNTED = {"core", "files", "stages", "test_pipeline.py"}
 """Whose tests are counted for the coverage, which is that of these packages."""
 
 

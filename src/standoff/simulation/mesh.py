@@ -18,6 +18,7 @@ import shapely
 import trimesh
 
 from standoff.core.homography import FloatArray
+from standoff.simulation.shading import shade
 
 Float32Array = npt.NDArray[np.float32]
 _CREASE_DEG = 35.0
@@ -81,12 +82,12 @@ class Mesh:
         cls, solid: trimesh.Trimesh, colour: Colour | None, surface: Surface, crease_deg: float = _CREASE_DEG
     ) -> Self:
         """Take a solid of one colour; edges sharper than `crease_deg` stay sharp. colour None: the tint alone."""
-        shaded = trimesh.graph.smooth_shade(solid, angle=np.deg2rad(crease_deg))
+        vertices_m, normals, triangles = shade(np.asarray(solid.vertices), np.asarray(solid.faces), crease_deg)
         return cls(
-            np.asarray(shaded.vertices, dtype=np.float32),
-            np.asarray(shaded.vertex_normals, dtype=np.float32),
-            *_coat(len(shaded.vertices), colour, surface),
-            np.asarray(shaded.faces, dtype=np.uint32),
+            vertices_m.astype(np.float32),
+            normals.astype(np.float32),
+            *_coat(len(vertices_m), colour, surface),
+            triangles.astype(np.uint32),
         )
 
     def moved(self, pose: FloatArray) -> Mesh:
@@ -210,10 +211,10 @@ def box(size_m: tuple[float, float, float], colour: Colour | None, surface: Surf
 
 @lru_cache
 def _shaded_box(*large: bool) -> tuple[Float32Array, Float32Array, npt.NDArray[np.uint32]]:
-    """Return corners of -1 and 1, normals and triangles of a box in the order in which trimesh shades one.
+    """Return corners of -1 and 1, normals and triangles of a box in the order in which `shade` has them.
 
-    Most things on a site are boxes, and trimesh takes its time. Its order depends on which sides are more than a tenth
-    of the box, and on nothing else: `large` across x, y and z.
+    Most things on a site are boxes. Their order depends on which sides are more than a tenth of the box, and on nothing
+    else: `large` across x, y and z.
     """
     sides_m2 = np.where(large, 1.0, 0.01)
     extents_m = np.sqrt(sides_m2.prod()) / sides_m2

@@ -19,6 +19,7 @@ from standoff import __version__
 from standoff.core.classes import CLASSES
 from standoff.core.homography import FloatArray
 from standoff.core.pose import View
+from standoff.files.whole import whole_folder
 from standoff.simulation.coco import Annotations
 from standoff.simulation.crew import work_through
 from standoff.simulation.detection_noise import DETECTIONS_SCHEMA, NoisyDetector
@@ -32,7 +33,6 @@ from standoff.simulation.telemetry import Origin, ShownSettings, write_telemetry
 from standoff.simulation.truth import FRAMES_SCHEMA, PAIRS_SCHEMA, TRUTH_SCHEMA, FrameTruth, Row
 from standoff.simulation.wearables import DEVICES_SCHEMA, report_positions
 from standoff.stages.ground import save_camera
-from standoff.stages.sinks.whole import whole_folder
 
 Made = TypeVar("Made")
 
