@@ -32,7 +32,6 @@ from standoff.simulation.survey import Surveyor
 from standoff.simulation.telemetry import Origin, ShownSettings, write_telemetry
 from standoff.simulation.truth import FRAMES_SCHEMA, PAIRS_SCHEMA, TRUTH_SCHEMA, FrameTruth, Row
 from standoff.simulation.wearables import DEVICES_SCHEMA, report_positions
-from standoff.stages.ground import save_camera
 
 Made = TypeVar("Made")
 
@@ -218,6 +217,9 @@ class Tables:
 
 def _save_surroundings(plan: Plan, site: Site, times_s: FloatArray, folder: Path) -> None:
     """Write what does not come frame by frame: scene, camera, reference object, telemetry, wearables."""
+    # numba, which comes with it, takes long to load, and every process that renders would wait for it
+    from standoff.stages.ground import save_camera
+
     _save_json(describe_scene(plan, site), folder / "scene.json")
     save_camera(site.camera, folder / "camera.yaml")
     _save_reference(site.scene.reference, site.scene.flight.view(times_s[0]), folder / "reference.yaml")

@@ -61,7 +61,8 @@ def _patches(adjacent: IndexArray, normals: FloatArray, double_m2: FloatArray, c
         return None
     patches = np.where(in_large, sides, _components(smooth, len(normals)))
     alone = np.bincount(patches, minlength=len(normals))[patches] == 1
-    return patches + len(normals) * (in_large + 2 * alone)
+    numbers: IndexArray = patches + len(normals) * (in_large + 2 * alone)
+    return numbers
 
 
 def _components(links: IndexArray, count: int) -> IndexArray:
@@ -70,7 +71,7 @@ def _components(links: IndexArray, count: int) -> IndexArray:
     >>> _components(np.array([[3, 1], [4, 3]]), 5).tolist()
     [0, 1, 2, 1, 1]
     """
-    roots = np.arange(count)
+    roots: IndexArray = np.arange(count)
     while True:
         ends = roots[links]
         low, high = ends.min(axis=1), ends.max(axis=1)
@@ -88,8 +89,9 @@ def _adjacent(faces: IndexArray, vertices: int) -> IndexArray:
     order = np.argsort(keys, kind="stable")
     starts = np.flatnonzero(np.diff(keys[order], prepend=-1))
     starts = starts[np.diff(starts, append=len(keys)) == 2]
-    pairs = np.stack([order[starts], order[starts + 1]], axis=1) // 3
-    return pairs[pairs[:, 0] != pairs[:, 1]]
+    pairs: IndexArray = np.stack([order[starts], order[starts + 1]], axis=1) // 3
+    two: IndexArray = pairs[pairs[:, 0] != pairs[:, 1]]
+    return two
 
 
 def _angles(corners_m: FloatArray) -> FloatArray:
