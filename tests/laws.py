@@ -1,6 +1,8 @@
-"""How hard a law is tried: with the same examples everywhere, or in an open search (`make fuzz`)."""
+"""How hard a law is tried: with the same examples everywhere, with more seeds, or in an open search (`make fuzz`)."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -34,3 +36,8 @@ def forget_our_constants() -> None:
 def examples(count: int) -> settings:
     """Return the settings of a law that is worth another number of examples than most."""
     return settings(max_examples=count * settings().max_examples // EXAMPLES)
+
+
+def seeds(count: int, *, quick: int = 2) -> list[Any]:
+    """Return the parameters of a law that is tried with several seeds: a few each time, all in `make test-live`."""
+    return [seed if seed < quick else pytest.param(seed, marks=pytest.mark.live) for seed in range(count)]

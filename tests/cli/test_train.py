@@ -16,6 +16,12 @@ _SETTINGS: dict[str, object] = {
 }  # fmt: skip
 
 
+@pytest.fixture(autouse=True)
+def plain_curves(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Draw no curves, which takes half of a short run: the tests of a run look at them."""
+    monkeypatch.setattr("standoff.training.run.folder.draw_curves", lambda rows, classes, path: path.touch())
+
+
 @pytest.fixture
 def plan(tmp_path: Path) -> Path:
     write_data(tmp_path / "blocks")

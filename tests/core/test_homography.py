@@ -12,6 +12,9 @@ from standoff.core import homography
 from standoff.core.homography import FloatArray
 
 _PICTURE = np.array([1920.0, 1080.0])
+_TRIAL_SEEDS = [0, 1, *(pytest.param(seed, marks=pytest.mark.live) for seed in (2, 3))]
+"""Of views whose errors are compared with thousands of trials."""
+
 _CORNERS_PX = np.array([[860.0, 500.0], [1060.0, 510.0], [1090.0, 640.0], [840.0, 630.0]])
 
 
@@ -122,7 +125,7 @@ def test_a_common_factor_of_all_entries_moves_no_point() -> None:
     assert np.abs(moved).max() < GEOMETRY_REL * np.abs(by_entries).max()
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", _TRIAL_SEEDS)
 def test_the_covariance_of_a_four_point_fit_is_that_of_random_trials(seed: int) -> None:
     rng = np.random.default_rng(seed)
     image_to_ground = oblique_map(rng.uniform(20, 40), rng.uniform(20, 55), rng.uniform(-180, 180))
@@ -141,7 +144,7 @@ def test_the_covariance_of_a_four_point_fit_is_that_of_random_trials(seed: int) 
             assert np.sqrt(predicted[i, axis, axis]) == pytest.approx(seen[:, i, axis].std(), rel=FIRST_ORDER_SIGMA_REL)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", _TRIAL_SEEDS)
 def test_the_error_of_a_distance_through_the_map_is_that_of_random_trials(seed: int) -> None:
     rng = np.random.default_rng(100 + seed)
     image_to_ground = oblique_map(rng.uniform(20, 40), rng.uniform(20, 55), rng.uniform(-180, 180))

@@ -139,7 +139,7 @@ def test_unusable_input_is_refused_in_one_line(tmp_path: Path) -> None:
         evaluate_checkerboard(tmp_path)
 
 
-@pytest.mark.parametrize("camera", [None, _PINHOLE])
+@pytest.mark.parametrize("camera", [pytest.param(None, marks=pytest.mark.live), _PINHOLE])
 def test_the_figure_is_drawn(tmp_path: Path, camera: Camera | None) -> None:
     views = [photographed(t, name=f"{t}.png") for t in (5.0, 15.0, 30.0)]
     path = tmp_path / "figure.png"

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from laws import seeds
 from simulation.moving_models import MovingModel
 
 from standoff.simulation import behaviour
@@ -62,7 +63,7 @@ def _motions(name: str, seed: int) -> list[tuple[MovingModel, Motion]]:
 
 
 @pytest.mark.parametrize("name", SCRIPTS)
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", seeds(3))
 def test_speeds_and_accelerations_are_those_of_the_machine(name: str, seed: int) -> None:
     for model, motion in _motions(name, seed):
         limits = MOBILITY[model.kind]
@@ -74,7 +75,7 @@ def test_speeds_and_accelerations_are_those_of_the_machine(name: str, seed: int)
 
 
 @pytest.mark.parametrize("name", SCRIPTS)
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", seeds(3))
 def test_joints_keep_to_their_ranges_and_move_no_faster_than_hydraulics_do(name: str, seed: int) -> None:
     for model, motion in _motions(name, seed):
         for joint, values in motion.joints.items():
@@ -111,7 +112,7 @@ def test_work_goes_on_for_the_whole_clip(name: str) -> None:
         )
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", seeds(5))
 def test_an_excavator_loads_a_truck_every_15_to_20_seconds(seed: int) -> None:
     excavator, truck = behaviour.truck_loading(
         np.random.default_rng(seed), EXCAVATOR, TRUCK, ORIGIN, ORIGIN.moved(1.0, 7.5), 90.0
@@ -153,7 +154,7 @@ def test_an_excavators_bucket_gets_where_it_shall() -> None:
 
 
 @pytest.mark.parametrize("distance_m", [15.0, 20.0])
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", seeds(4))
 def test_centres_stay_exactly_the_stated_distance_apart(distance_m: float, seed: int) -> None:
     rng = np.random.default_rng(seed)
     machine, worker = behaviour.keep_distance(
@@ -166,7 +167,7 @@ def test_centres_stay_exactly_the_stated_distance_apart(distance_m: float, seed:
 
 
 @pytest.mark.parametrize("meet", [behaviour.crossing_behind, behaviour.near_miss])
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", seeds(6))
 @pytest.mark.parametrize("closest_m", [2.5, 5.0])
 def test_an_encounter_comes_as_close_as_stated_and_no_closer(
     meet: Callable[..., tuple[Motion, Motion]], seed: int, closest_m: float

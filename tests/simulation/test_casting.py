@@ -5,6 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import shapely
+from laws import seeds
 from tolerances import GEOMETRY_REL
 
 from standoff.core.classes import CLASS_BY_NAME, CLASSES
@@ -54,7 +55,7 @@ def test_a_crowd_has_the_workers_and_machines_that_are_wanted(workers: int, mach
     assert people <= workers + machines
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", seeds(3))
 def test_nobody_who_is_added_alone_comes_into_the_way_of_others(seed: int) -> None:
     rng = np.random.default_rng(seed)
     cast, added = Cast(), []
@@ -69,7 +70,7 @@ def test_nobody_who_is_added_alone_comes_into_the_way_of_others(seed: int) -> No
         assert not any(way.intersects(other) for other in ways[:number])
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", seeds(3))
 def test_only_those_who_act_together_share_ground(seed: int) -> None:
     cast = crowd(np.random.default_rng(seed), _STAGE, workers=6, machines=4)
     ways = [swept(actor.model, actor.motion) for actor in cast.actors]
@@ -84,13 +85,13 @@ def test_only_those_who_act_together_share_ground(seed: int) -> None:
     assert not any(pair[1] == following[0] for pair, following in pairwise(met)), "a group has two at most"
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", seeds(3))
 def test_the_reference_object_is_never_driven_over(seed: int) -> None:
     bed = shapely.Point(_STAGE.place(-3.0, -2.0).xy_m).buffer(1.5)
     assert not any(way.intersects(bed) for way in _cast("busy", seed).machines_way)
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", seeds(2))
 def test_an_actor_is_inside_its_way_at_any_time(seed: int) -> None:
     for actor in _cast("mobile", seed).actors:
         way = swept(actor.model, actor.motion)
@@ -99,7 +100,7 @@ def test_an_actor_is_inside_its_way_at_any_time(seed: int) -> None:
 
 
 @pytest.mark.parametrize("distance_m", [15, 20])
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", seeds(3))
 def test_the_stationary_cast_keeps_its_distance(distance_m: int, seed: int) -> None:
     excavator, worker = _cast(f"stationary-{distance_m}", seed).actors
     assert excavator.model.class_id == CLASS_BY_NAME["excavator"].id and is_person(worker.model)
@@ -113,7 +114,7 @@ def test_a_stage_turns_with_the_camera() -> None:
     np.testing.assert_allclose(east.xy_m, [5.0, -2.0], atol=1e-12)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", seeds(6))
 def test_the_demo_has_one_near_miss_and_one_breach_whatever_the_seed(seed: int) -> None:
     actors = _cast("demo", seed, Stage(60.0 * seed, 1.0, 14.0, None, None)).actors
     workers = [actor for actor in actors if is_person(actor.model)]

@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 import pytest
 import yaml
+from laws import seeds
 from pycocotools.coco import COCO
 
 from standoff.core.classes import CLASSES
@@ -30,7 +31,7 @@ _ROUNDED_PX = 1e-3
 """Half a unit of YOLO's last decimal, in pixels of a picture under 1000 px wide, and some room."""
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")  # of one worker, wherever its turn to run the tests of this file comes
 def sets(opengl: None, tmp_path_factory: pytest.TempPathFactory) -> SimpleNamespace:
     """Render the same pictures in both layouts, with one process and with two."""
     root = tmp_path_factory.mktemp("sets")
@@ -133,7 +134,7 @@ def test_trainers_find_the_splits_and_names(sets: SimpleNamespace) -> None:
 
 
 @pytest.mark.parametrize("held_out", [0.0, 0.1, 0.25, 0.5])
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", seeds(3))
 def test_the_held_out_shares_are_kept(held_out: float, seed: int) -> None:
     plan = replace(_PLAN, images=200, held_out=held_out, seed=seed)
     splits = [plan.split_of(scene) for scene in range(plan.scenes)]

@@ -6,6 +6,7 @@ from typing import get_args
 import cv2
 import numpy as np
 import pytest
+from laws import seeds
 from tolerances import GEOMETRY_REL
 
 from standoff.core.homography import apply
@@ -44,7 +45,7 @@ def test_a_view_is_the_same_whenever_it_is_asked_for(style: FlightStyle) -> None
 
 
 @pytest.mark.parametrize("style", STYLES)
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", seeds(3))
 def test_a_flight_is_smooth(style: FlightStyle, seed: int) -> None:
     flight, step_s = _flight(style, seed), 1e-3
     times_s = np.arange(0.0, 0.5, step_s) + 5.0
@@ -59,7 +60,7 @@ def test_a_flight_is_smooth(style: FlightStyle, seed: int) -> None:
     assert max(turn) > 0.0
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", seeds(4))
 def test_a_hovering_drone_wanders_by_decimetres_and_keeps_its_target_in_the_picture(seed: int) -> None:
     flight = _flight("hover", seed)
     views = [flight.view(time_s) for time_s in np.arange(0.0, 60.0, 0.25).tolist()]
@@ -87,7 +88,7 @@ def test_a_pass_has_its_target_in_the_middle_half_way() -> None:
     assert 1.5 < speed_mps < 5.5
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", seeds(4))
 def test_an_excursion_loses_its_target_and_comes_back(seed: int) -> None:
     flight = _flight("away", seed)
     x_px = [flight.view(time_s).project(np.array([[*TARGET_M, 0.0]]))[0][0] for time_s in (0.0, 6.0, 12.0)]
@@ -112,7 +113,7 @@ def test_the_blur_takes_points_of_the_plane_where_they_are_one_exposure_later(st
     assert valid.all()
 
 
-@pytest.mark.parametrize("seed", range(30))
+@pytest.mark.parametrize("seed", seeds(30))
 def test_a_drones_lens_can_be_undone_all_over_the_picture(seed: int) -> None:
     rng = np.random.default_rng(seed)
     camera = drone_camera(3840, 2140, rng.uniform(60.0, 84.0), rng)

@@ -3,6 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapely
+from laws import seeds
 
 from standoff.simulation.layout import lay_out
 from standoff.simulation.mesh import Mesh, Surface, box
@@ -47,7 +48,7 @@ def outlines(batches: tuple[Batch, ...], bottom_only: bool = True) -> list[shape
     return found
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", seeds(5))
 def test_nothing_overlaps_and_nothing_lies_where_it_must_not(seed: int) -> None:
     props = [prop for prop, _ in BRICKS]
     shapes = outlines(lay_out(np.random.default_rng(seed), props, 0.3, CLEAR, EXTENT_M, hillside()))
@@ -59,7 +60,7 @@ def test_nothing_overlaps_and_nothing_lies_where_it_must_not(seed: int) -> None:
     assert all(shapely.box(*EXTENT_M).buffer(0.05).contains(shape) for shape in shapes)
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", seeds(5))
 def test_low_things_lean_with_the_ground_and_tall_ones_stand_upright_with_no_gap(seed: int) -> None:
     ground = hillside()
     batches = lay_out(np.random.default_rng(seed), [prop for prop, _ in BRICKS], 0.25, (), EXTENT_M, ground)
@@ -92,7 +93,7 @@ def test_the_same_seed_lays_out_the_same_site_and_another_seed_another() -> None
     assert [len(batch.poses) for batch in first] != [len(batch.poses) for batch in other]
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", seeds(3))
 def test_every_mesh_has_one_batch_with_a_tint_and_dust_for_each_place(seed: int) -> None:
     batches = lay_out(np.random.default_rng(seed), CLUTTER, 0.2, CLEAR, EXTENT_M, hillside())
     assert len({id(batch.mesh) for batch in batches}) == len(batches)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from laws import seeds
 from simulation.moving_models import MovingModel
 from tolerances import GEOMETRY_REL
 
@@ -62,7 +63,7 @@ def _derivatives(motion: Motion) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 @pytest.mark.parametrize("kind", sorted(set(MOBILITY) - {"worker"}))
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", seeds(6))
 def test_a_drive_keeps_to_every_limit_of_its_machine(kind: str, seed: int) -> None:
     rng = np.random.default_rng(seed)
     reverse = bool(seed % 2)
@@ -116,7 +117,7 @@ def test_front_wheels_point_along_their_own_way() -> None:
     np.testing.assert_allclose(steered_deg[moving], motion.joints["steer_deg"][moving], atol=0.05)
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", seeds(8))
 def test_a_walk_passes_through_its_points_at_a_walking_pace(seed: int) -> None:
     rng = np.random.default_rng(seed)
     points_m = np.cumsum(rng.uniform([2.0, -3.0], [5.0, 3.0], (5, 2)), axis=0)

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from laws import seeds
 from tolerances import GEOMETRY_REL
 
 from standoff.config import load_settings
@@ -29,7 +30,7 @@ def _plan(name: str = "stationary-15", seed: int = 3) -> Plan:
     return replace(plan, preset=replace(plan.preset, clutter=0.05))  # most of a site's making is what lies about
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")  # of one worker, wherever its turn to run the tests of this file comes
 def clip(opengl: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("clips") / "clip"
     record_clip(_plan(), out, processes=1)
@@ -93,7 +94,7 @@ def test_a_folder_with_files_is_not_overwritten_unless_asked(clip: Path) -> None
         record_clip(_plan(), clip, processes=1)
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", seeds(3))
 def test_a_variable_rate_varies_and_always_rises(seed: int) -> None:
     steady = frame_times_s(plan_clip("busy", seed=seed))
     varied = frame_times_s(replace(plan_clip("busy", seed=seed), variable_rate=True))

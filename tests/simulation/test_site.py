@@ -22,7 +22,15 @@ def _is_under_a_crane(site: Site) -> bool:
     return any(float(batch.poses[:, 2, 3].max()) > 24.0 for batch in site.scene.props if len(batch.poses) == 1)
 
 
-@pytest.mark.parametrize(("condition", "seed"), [("noon", 1), ("afternoon", 5), ("hazy", 7), ("overcast", 9)])
+@pytest.mark.parametrize(
+    ("condition", "seed"),
+    [
+        ("noon", 1),
+        pytest.param("afternoon", 5, marks=pytest.mark.live),
+        pytest.param("hazy", 7, marks=pytest.mark.live),
+        ("overcast", 9),
+    ],
+)
 def test_daylight_is_exposed_to_the_middle_of_the_scale(condition: Condition, seed: int) -> None:
     site = _site("mobile", seed, condition)
     with Studio(site) as studio:

@@ -7,6 +7,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
+from laws import seeds
 
 from standoff.core.homography import FloatArray
 from standoff.simulation.canvas import Canvas, fractal
@@ -51,7 +52,7 @@ def test_soil_has_texture_from_a_hand_to_tens_of_metres(soil: Soil) -> None:
     assert 55.0 < grey.mean() < 215.0
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", seeds(3))
 def test_dry_soil_is_paler_than_wet_soil(seed: int) -> None:
     dry, dry_wetness = painted(TerrainPlan(extent_m=_STRIP_M, moisture=0.0, puddles=0.0, grass=0.0), seed)
     wet, wet_wetness = painted(TerrainPlan(extent_m=_STRIP_M, moisture=1.0, puddles=0.05, grass=0.0), seed)
@@ -123,7 +124,7 @@ def test_prints_leave_ground_without_traffic_as_it_is() -> None:
     assert (prints == 128).mean() > 0.8
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", seeds(3))
 def test_a_fractal_has_zero_mean_and_unit_deviation(seed: int) -> None:
     field = fractal(np.random.default_rng(seed), (300, 500), 4, 256)
     assert field.shape == (300, 500)

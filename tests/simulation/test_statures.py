@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from laws import seeds
 from simulation.flat_ground import FlatGround, camera, light
 from tolerances import GEOMETRY_REL
 
@@ -73,7 +74,7 @@ def test_as_many_stoop_as_wanted_and_stay_where_they_were() -> None:
         assert bent == count
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", seeds(4))
 def test_who_stoops_is_bent_most_of_the_time_and_upright_now_and_then(seed: int) -> None:
     rng = np.random.default_rng(seed)
     worker = make_worker(rng)

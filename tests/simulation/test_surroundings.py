@@ -7,6 +7,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from laws import seeds
 
 from standoff.core.homography import FloatArray
 from standoff.simulation.buildings import COTTAGES, FLATS, SHEDS, House, building, scaffolding
@@ -52,7 +53,7 @@ def world_points(batch: Batch) -> FloatArray:
     return points
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", seeds(3))
 @pytest.mark.parametrize("setting", list(Setting))
 def test_surroundings_stay_off_the_site_within_reach_and_within_the_budget(setting: Setting, seed: int) -> None:
     batches = make_surroundings(np.random.default_rng(seed), flat_terrain(), setting=setting)

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from laws import seeds
 
 from standoff.core.homography import FloatArray
 from standoff.core.pose import View
@@ -62,7 +63,7 @@ def _metres(origin: Origin, latitude_deg: FloatArray, longitude_deg: FloatArray)
 
 
 @pytest.mark.parametrize("style", ["hover", "pass", "orbit"])
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", seeds(4))
 def test_readings_are_wrong_by_as_much_as_stated_and_no_more(tmp_path: Path, style: FlightStyle, seed: int) -> None:
     flight = _flight(style, seed)
     read, _ = _written(tmp_path / "telemetry.srt", flight, seed)

@@ -10,7 +10,7 @@ import shapely
 import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
-from laws import examples
+from laws import examples, seeds
 
 from standoff.simulation.relief import beside, grid_shape, make_relief
 from standoff.simulation.site_plans import SiteStyle, random_plan
@@ -95,7 +95,7 @@ def test_the_border_is_at_height_zero_where_the_surroundings_begin(style: SiteSt
     np.testing.assert_allclose(border, 0.0, atol=1e-6)
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", seeds(3))
 def test_a_firm_patch_is_level_within_two_centimetres_whatever_lies_under_it(seed: int) -> None:
     rng = np.random.default_rng(seed)
     patches = (FlatPatch((3.0, -8.0), 3.2), FlatPatch((-30.0, 20.0), 6.0, 0.4))
@@ -238,7 +238,7 @@ def test_a_shifted_straight_path_keeps_its_distance(offset_m: float, turn: float
 
 
 @pytest.mark.parametrize("style", list(SiteStyle))
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", seeds(3))
 def test_nothing_is_dug_heaped_or_cast_where_somebody_goes(style: SiteStyle, seed: int) -> None:
     way = shapely.LineString([(-40.0, -20.0), (0.0, 5.0), (35.0, 30.0)]).buffer(2.0)
     plan = random_plan(np.random.default_rng(seed), style, ways=[way])

@@ -3,6 +3,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
+from laws import seeds
 from pycocotools import mask as coco_mask
 from tolerances import HULL_BOX_PX
 
@@ -49,7 +50,7 @@ def _moment(*bodies: Body) -> Moment:
     return Moment(0.5, _VIEW, bodies, (), (), False)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", seeds(4))
 def test_the_full_box_is_that_of_every_vertex(seed: int) -> None:
     rng = np.random.default_rng(seed)
     shape = ball((1.0, 0.5, 2.0), None, surface=box((1, 1, 1), None).surface[0])
@@ -68,7 +69,7 @@ def test_a_body_that_reaches_behind_the_camera_has_no_full_box() -> None:
     assert np.isnan(full_box_px([behind], _VIEW)).all()
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", seeds(4))
 def test_visible_boxes_are_those_of_opencv(seed: int) -> None:
     rng = np.random.default_rng(seed)
     ids = np.zeros((60, 80), np.uint16)
@@ -88,7 +89,7 @@ def test_visible_boxes_are_those_of_opencv(seed: int) -> None:
 
 # pycocotools' own array lacks numpy 2's `copy` keyword
 @pytest.mark.filterwarnings("ignore:__array__ implementation doesn't accept a copy keyword:DeprecationWarning")
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", seeds(4))
 def test_masks_decode_to_themselves_in_pycocotools(seed: int) -> None:
     rng = np.random.default_rng(seed)
     ids = (rng.random((13, 17)) < 0.4).astype(np.uint16) * 3

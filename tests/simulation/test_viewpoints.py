@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from laws import seeds
 
 from standoff.core.homography import FloatArray
 from standoff.core.pose import View
@@ -88,7 +89,7 @@ def test_what_is_low_hides_nothing() -> None:
     assert not low.hide(np.array([-9.0, 0.0, 0.5]), np.array([9.0, 0.0, 0.5]))
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", seeds(4))
 def test_a_drone_is_where_it_was_aimed_at_the_time_of_the_picture(seed: int) -> None:
     rng = np.random.default_rng(seed)
     view = _views([_body(0.0, 0.0)], count=1)[0]

@@ -10,10 +10,14 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import torch
 import yaml
 
+from standoff.training.darknet.cfg import parse_cfg
+from standoff.training.darknet.network import DarknetNetwork
 from standoff.training.pictures.augment import AugmentParams
 from standoff.training.run.params import TrainParams
+from standoff.training.start.initial_weights import initialize_layers
 
 CLASSES = ("worker", "vehicle")
 _COLOURS_BGR = ((40, 200, 250), (200, 60, 30))
@@ -92,6 +96,13 @@ def write_data(folder: Path, *, pictures: int = 24, seed: int = 0, points: bool 
     names = dict(enumerate(CLASSES))
     (folder / "data.yaml").write_text(yaml.safe_dump({"train": "images/train", "val": "images/val", "names": names}))
     return folder
+
+
+def small_network(seed: int = 0) -> DarknetNetwork:
+    network = DarknetNetwork(parse_cfg(CFG, "small.cfg"))
+    layers = [index for index, _ in network.convolutions()]
+    initialize_layers(network, layers, torch.Generator().manual_seed(seed))
+    return network
 
 
 def small_params(**changes: object) -> TrainParams:

@@ -22,8 +22,8 @@ def write_json(data: object, path: Path) -> None:
     Raises:
         OutputError: The file cannot be written.
     """
-    from standoff.stages.sinks.json_text import json_text
-    from standoff.stages.sinks.json_text import write_json as write_json_file
+    from standoff.files.json_text import json_text
+    from standoff.files.json_text import write_json as write_json_file
 
     if str(path) == "-":
         typer.echo(json_text(data), nl=False)

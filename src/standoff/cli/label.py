@@ -32,8 +32,8 @@ def label(
     from functools import partial
 
     from standoff.cli.console import progress
+    from standoff.files.whole import whole_folder
     from standoff.stages.detect import DetectParams, OnnxDetector, find_model
-    from standoff.stages.sinks.whole import whole_folder
     from standoff.training.frame_selection import LABEL_FILES, LabelPlan, SelectionParams, label_frames
     from standoff.training.frame_selection.doubt import LEAST_SCORE
 

@@ -9,9 +9,9 @@ from typing import Any, Final
 from urllib.parse import quote
 
 from standoff.core.types import Detections
+from standoff.files.json_text import json_text
+from standoff.files.whole import whole_file
 from standoff.labels.coco_document import CocoDocument
-from standoff.stages.sinks.json_text import json_text
-from standoff.stages.sinks.whole import whole_file
 
 _LOCAL_FILES: Final = "/data/local-files/?d="
 """How Label Studio names files of a folder that it is allowed to serve."""

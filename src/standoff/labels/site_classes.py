@@ -9,7 +9,6 @@ import numpy as np
 from standoff.core.classes import CLASS_BY_NAME, CLASSES
 from standoff.core.errors import DataError, ModelError
 from standoff.labels.types import LabelledData, LabelledPicture
-from standoff.stages.detect.class_map import map_classes
 
 
 def to_site_classes(data: LabelledData) -> LabelledData:
@@ -23,6 +22,9 @@ def to_site_classes(data: LabelledData) -> LabelledData:
     Raises:
         DataError: None of the classes is one of the site.
     """
+    # ONNX Runtime, which comes with it, takes long to load, and most who read labels do not need it
+    from standoff.stages.detect.class_map import map_classes
+
     try:
         site_names = map_classes(data.classes, {}, "the labelled pictures")
     except ModelError as error:

@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 
 from standoff.core.pose import View
+from standoff.files.whole import whole_folder
 from standoff.labels.types import Split
 from standoff.simulation.covers import COVER_KINDS
 from standoff.simulation.crew import work_through
@@ -26,7 +27,6 @@ from standoff.simulation.site_plans import SiteStyle
 from standoff.simulation.studio import Studio
 from standoff.simulation.truth import Row
 from standoff.simulation.viewpoints import Obstacles, draw_flight, draw_view
-from standoff.stages.sinks.whole import whole_folder
 
 _SCENE_FRAMES = 240
 _SHUTTERS_S = (0.0, 0.0, 1 / 240, 1 / 100)

@@ -18,6 +18,7 @@ import shapely
 import trimesh
 
 from standoff.core.homography import FloatArray
+from standoff.simulation.shading import shade
 
 Float32Array = npt.NDArray[np.float32]
 _CREASE_DEG = 35.0
@@ -81,12 +82,20 @@ class Mesh:
         cls, solid: trimesh.Trimesh, colour: Colour | None, surface: Surface, crease_deg: float = _CREASE_DEG
     ) -> Self:
         """Take a solid of one colour; edges sharper than `crease_deg` stay sharp. colour None: the tint alone."""
-        shaded = trimesh.graph.smooth_shade(solid, angle=np.deg2rad(crease_deg))
+        return cls.shaded(np.asarray(solid.vertices), np.asarray(solid.faces), colour, surface, crease_deg)
+
+    @classmethod
+    def shaded(
+        cls, corners_m: FloatArray, faces: npt.NDArray[np.int64], colour: Colour | None, surface: Surface,
+        crease_deg: float = _CREASE_DEG,
+    ) -> Self:  # fmt: skip
+        """Do as `of` with the solid's (V, 3) corners and (F, 3) faces."""
+        vertices_m, normals, triangles = shade(corners_m, faces, crease_deg)
         return cls(
-            np.asarray(shaded.vertices, dtype=np.float32),
-            np.asarray(shaded.vertex_normals, dtype=np.float32),
-            *_coat(len(shaded.vertices), colour, surface),
-            np.asarray(shaded.faces, dtype=np.uint32),
+            vertices_m.astype(np.float32),
+            normals.astype(np.float32),
+            *_coat(len(vertices_m), colour, surface),
+            triangles.astype(np.uint32),
         )
 
     def moved(self, pose: FloatArray) -> Mesh:
@@ -94,7 +103,7 @@ class Mesh:
         linear = np.asarray(pose, dtype=np.float64)[:3, :3]
         vertices = self.vertices_m @ linear.T + np.asarray(pose)[:3, 3]
         normals = self.normals @ np.linalg.inv(linear)
-        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        normals /= np.sqrt(np.einsum("ij,ij->i", normals, normals))[:, None]
         triangles = self.triangles if np.linalg.det(linear) > 0 else self.triangles[:, ::-1]
         return replace(
             self,
@@ -105,7 +114,7 @@ class Mesh:
 
     def at(self, x_m: float, y_m: float, z_m: float) -> Mesh:
         """Return the mesh moved by an offset."""
-        return self.moved(translation(x_m, y_m, z_m))
+        return replace(self, vertices_m=(self.vertices_m + np.array([x_m, y_m, z_m])).astype(np.float32))
 
 
 def _coat(
@@ -210,10 +219,10 @@ def box(size_m: tuple[float, float, float], colour: Colour | None, surface: Surf
 
 @lru_cache
 def _shaded_box(*large: bool) -> tuple[Float32Array, Float32Array, npt.NDArray[np.uint32]]:
-    """Return corners of -1 and 1, normals and triangles of a box in the order in which trimesh shades one.
+    """Return corners of -1 and 1, normals and triangles of a box in the order in which `shade` has them.
 
-    Most things on a site are boxes, and trimesh takes its time. Its order depends on which sides are more than a tenth
-    of the box, and on nothing else: `large` across x, y and z.
+    Most things on a site are boxes. Their order depends on which sides are more than a tenth of the box, and on nothing
+    else: `large` across x, y and z.
     """
     sides_m2 = np.where(large, 1.0, 0.01)
     extents_m = np.sqrt(sides_m2.prod()) / sides_m2
@@ -229,10 +238,19 @@ def cylinder(
     axis: str = "z", sections: int = 16,
 ) -> Mesh:  # fmt: skip
     """Return a cylinder centred at the origin along an axis."""
-    solid = trimesh.creation.cylinder(radius=radius_m, height=length_m, sections=sections)
-    turn = {"x": rotation("y", 90.0), "y": rotation("x", 90.0), "z": np.eye(4)}[axis]
-    solid.apply_transform(turn)
-    return Mesh.of(solid, colour, surface)
+    corners, faces = _unit_cylinder(sections)
+    turn = {"x": rotation("y", 90.0), "y": rotation("x", 90.0), "z": np.eye(4)}[axis][:3, :3]
+    return Mesh.shaded((corners * (radius_m, radius_m, length_m)) @ turn.T, faces, colour, surface)
+
+
+@lru_cache
+def _unit_cylinder(sections: int) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+    """Return the corners and faces of a cylinder of radius 1 and length 1 about z, centred at the origin."""
+    solid = trimesh.creation.cylinder(radius=1.0, height=1.0, sections=sections)
+    corners, faces = np.array(solid.vertices), np.array(solid.faces)
+    corners.setflags(write=False)
+    faces.setflags(write=False)
+    return corners, faces
 
 
 def profile(
@@ -258,11 +276,15 @@ def tube(
 ) -> Mesh:  # fmt: skip
     """Return a round bar or hose along a (N, 3) path, a cylinder for each piece."""
     points = np.asarray(path_m, dtype=np.float64)
-    pieces = [
-        trimesh.creation.cylinder(radius=radius_m, segment=points[i : i + 2], sections=sections)
-        for i in range(len(points) - 1)
-    ]
-    return Mesh.of(trimesh.util.concatenate(pieces), colour, surface, crease_deg=60.0)
+    corners, faces = _unit_cylinder(sections)
+    pieces = []
+    for start, along in zip(points[:-1], np.diff(points, axis=0), strict=True):
+        turn = trimesh.geometry.align_vectors([0.0, 0.0, 1.0], along)[:3, :3]
+        pieces.append((corners * (radius_m, radius_m, np.linalg.norm(along))) @ turn.T + start + along / 2)
+    starts = len(corners) * np.arange(len(pieces))
+    all_faces = (faces + starts[:, None, None]).reshape(-1, 3)
+    # the edges of six sections turn by 60 degrees, and rounding must not decide which of them are sharp
+    return Mesh.shaded(np.concatenate(pieces), all_faces, colour, surface, crease_deg=61.0)
 
 
 def lathe(

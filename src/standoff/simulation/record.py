@@ -19,6 +19,7 @@ from standoff import __version__
 from standoff.core.classes import CLASSES
 from standoff.core.homography import FloatArray
 from standoff.core.pose import View
+from standoff.files.whole import whole_folder
 from standoff.simulation.coco import Annotations
 from standoff.simulation.crew import work_through
 from standoff.simulation.detection_noise import DETECTIONS_SCHEMA, NoisyDetector
@@ -31,8 +32,6 @@ from standoff.simulation.survey import Surveyor
 from standoff.simulation.telemetry import Origin, ShownSettings, write_telemetry
 from standoff.simulation.truth import FRAMES_SCHEMA, PAIRS_SCHEMA, TRUTH_SCHEMA, FrameTruth, Row
 from standoff.simulation.wearables import DEVICES_SCHEMA, report_positions
-from standoff.stages.ground import save_camera
-from standoff.stages.sinks.whole import whole_folder
 
 Made = TypeVar("Made")
 
@@ -218,6 +217,9 @@ class Tables:
 
 def _save_surroundings(plan: Plan, site: Site, times_s: FloatArray, folder: Path) -> None:
     """Write what does not come frame by frame: scene, camera, reference object, telemetry, wearables."""
+    # numba, which comes with it, takes long to load, and every process that renders would wait for it
+    from standoff.stages.ground import save_camera
+
     _save_json(describe_scene(plan, site), folder / "scene.json")
     save_camera(site.camera, folder / "camera.yaml")
     _save_reference(site.scene.reference, site.scene.flight.view(times_s[0]), folder / "reference.yaml")

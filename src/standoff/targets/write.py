@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from standoff.core.errors import OutputError
-from standoff.stages.sinks.whole import whole_file
+from standoff.files.whole import whole_file
 from standoff.targets.assembly import assembly_page, tile_name
 from standoff.targets.drawing import FAINT, INK, NOTE, draw_bar, draw_target, page, points
 from standoff.targets.sheet import MARGIN_MM, OVERLAP_MM, Paper, Target, Tile, tiles

@@ -17,8 +17,8 @@ import numpy.typing as npt
 import onnx
 
 from standoff.core.errors import ConfigError, ModelError
+from standoff.files.whole import whole_file
 from standoff.stages.detect.model_card import INPUT_NAME, OUTPUT_NAME, POINTS_NAME, ModelCard, file_sha256
-from standoff.stages.sinks.whole import whole_file
 from standoff.training.quantization.onnx_file import read_own_model
 
 _BOX_COLUMNS = 5

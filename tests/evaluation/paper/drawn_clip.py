@@ -8,6 +8,8 @@ from __future__ import annotations
 import json
 import sys
 from dataclasses import dataclass
+from functools import cache
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
@@ -71,7 +73,7 @@ def seen_px(frame: int, points_m: FloatArray) -> FloatArray:
 
 def write_clip(folder: Path, preset: str = "mobile") -> Path:
     folder.mkdir(parents=True)
-    _write_video(folder / "video.mp4")
+    (folder / "video.mp4").write_bytes(_film())
     width, height = draw_site.SIZE_PX
     camera = {"width_px": width, "height_px": height, "fx": draw_site.FOCAL_PX, "fy": draw_site.FOCAL_PX}
     (folder / "camera.yaml").write_text(
@@ -116,9 +118,11 @@ def true_distance_m(frame: int, first: Entity, second: Entity) -> float:
     return float(np.hypot(*(first.xy_m(time_s(frame)) - second.xy_m(time_s(frame)))))
 
 
-def _write_video(path: Path) -> None:
-    ground = draw_site.draw_ground(seed=3)
-    with patch.object(draw_site, "BLOCKS", ()), av.open(str(path), "w") as container:
+@cache
+def _film() -> bytes:
+    """Return the file; it takes seconds to draw and encode, and many modules want it."""
+    ground, file = draw_site.draw_ground(seed=3), BytesIO()
+    with patch.object(draw_site, "BLOCKS", ()), av.open(file, "w", format="mp4") as container:
         stream = container.add_stream("h264", rate=draw_site.FRAMES_PER_S, options={"crf": "14"})
         stream.width, stream.height, stream.pix_fmt = *draw_site.SIZE_PX, "yuv420p"
         for frame in range(FRAMES):
@@ -128,6 +132,7 @@ def _write_video(path: Path) -> None:
                 cv2.circle(picture, centre, 110, (96, 124, 148), cv2.FILLED)
             container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="bgr24")))
         container.mux(stream.encode(None))
+    return file.getvalue()
 
 
 def _box(points_px: FloatArray) -> dict[str, float]:

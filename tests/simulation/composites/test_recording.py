@@ -18,7 +18,7 @@ _SIZE_PX = (320, 180)
 _FLIGHTS = ("field", "park", "yard")
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")  # of one worker, wherever its turn to run the tests of this file comes
 def photographs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Noise of three colours, so that a picture shows which flight it is from; a marked car in each of `yard`."""
     folder = tmp_path_factory.mktemp("photographs")
@@ -35,7 +35,7 @@ def photographs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")  # of one worker, wherever its turn to run the tests of this file comes
 def sets(opengl: None, photographs: Path, tmp_path_factory: pytest.TempPathFactory) -> SimpleNamespace:
     """Make the same pictures with one process and with two."""
     root = tmp_path_factory.mktemp("composites")

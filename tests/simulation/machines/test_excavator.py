@@ -5,6 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 import pytest
 import shapely
+from laws import seeds
 
 from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.homography import FloatArray
@@ -68,7 +69,7 @@ def test_it_has_a_budget_of_triangles(excavator: Excavator) -> None:
     assert 3000 < count < _TRIANGLES
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", seeds(4))
 def test_the_tool_tip_is_the_end_of_the_bucket(excavator: Excavator, seed: int) -> None:
     joints = _random_joints(np.random.default_rng(seed))
     frames = excavator.linkage.frames({**joints})
@@ -83,7 +84,7 @@ def test_the_tool_tip_is_the_end_of_the_bucket(excavator: Excavator, seed: int) 
     np.testing.assert_allclose(edge.mean(axis=0), excavator.tool_tip_m(joints), atol=0.01 + half_plate_m)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", seeds(4))
 def test_every_cylinder_ends_at_its_pivots(excavator: Excavator, seed: int) -> None:
     joints = _random_joints(np.random.default_rng(seed))
     frames = excavator.linkage.frames(joints)
@@ -105,7 +106,7 @@ def test_every_cylinder_ends_at_its_pivots(excavator: Excavator, seed: int) -> N
             assert barrel_long_m + rod_long_m > np.linalg.norm(moved_m - held_m) - 0.02
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", seeds(4))
 def test_the_bucket_linkage_stays_closed(excavator: Excavator, seed: int) -> None:
     frames = excavator.linkage.frames(_random_joints(np.random.default_rng(seed)))
     linkage = excavator.linkage

@@ -5,6 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 import pytest
 import shapely
+from laws import seeds
 
 from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.homography import FloatArray
@@ -63,7 +64,7 @@ def test_it_has_a_budget_of_triangles(loader: WheelLoader) -> None:
     assert 3000 < count < 8000
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", seeds(4))
 def test_the_tool_tip_is_the_front_of_the_bucket(loader: WheelLoader, seed: int) -> None:
     joints = _random_joints(np.random.default_rng(seed))
     tip = loader.tool_tip_m(joints)
@@ -74,7 +75,7 @@ def test_the_tool_tip_is_the_front_of_the_bucket(loader: WheelLoader, seed: int)
     np.testing.assert_allclose(corners_m[front].mean(axis=0), tip, atol=0.01)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", seeds(4))
 def test_every_cylinder_ends_at_its_pivots_and_is_long_enough(loader: WheelLoader, seed: int) -> None:
     joints = _random_joints(np.random.default_rng(seed))
     front = np.eye(4)
@@ -93,7 +94,7 @@ def test_every_cylinder_ends_at_its_pivots_and_is_long_enough(loader: WheelLoade
             assert reach_m > np.linalg.norm(pivots[1] - pivots[0]) - 0.02
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", seeds(6))
 def test_the_crank_keeps_its_length_and_holds_the_bucket(loader: WheelLoader, seed: int) -> None:
     pivot, top, end, ear = crank_points_m(loader.size, _random_joints(np.random.default_rng(seed)))
     assert np.linalg.norm(top - pivot) == pytest.approx(loader.size.crank_m[0])

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from laws import seeds
 from tolerances import GEOMETRY_REL
 
 from standoff.core.homography import FloatArray
@@ -54,7 +55,7 @@ def test_a_cycle_later_the_body_is_the_same(phase: float, speed_mps: float) -> N
         np.testing.assert_allclose(later[name], place_m, atol=1e-7, err_msg=name)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", seeds(4))
 @pytest.mark.parametrize("speed_mps", [0.6, 1.8])
 def test_what_touches_the_ground_does_not_slide(seed: int, speed_mps: float) -> None:
     person = make_worker(np.random.default_rng(seed))
@@ -73,7 +74,7 @@ def test_what_touches_the_ground_does_not_slide(seed: int, speed_mps: float) -> 
     assert (slid_m < ALLOWED_SLIP * person.step_m).all()
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", seeds(4))
 def test_a_cycle_takes_the_walker_two_steps_ahead(seed: int) -> None:
     person = make_worker(np.random.default_rng(seed))
     for part, again in zip(

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
-from laws import examples
+from laws import examples, seeds
 from tolerances import FOOT_ON_GROUND_M
 
 from standoff.core.classes import CLASS_BY_NAME
@@ -75,7 +75,7 @@ def test_no_joint_value_tears_a_body_apart(seed: int, joints: dict[str, float]) 
     assert points_m[:, 2].max() < 1.05 * person.height_m
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", seeds(12))
 def test_height_is_the_top_of_the_hat_and_close_to_the_stature(seed: int) -> None:
     person = worker(seed)
     assert cloud(person.parts(UPRIGHT))[:, 2].max() == pytest.approx(person.height_m, abs=1e-6)
@@ -83,7 +83,7 @@ def test_height_is_the_top_of_the_hat_and_close_to_the_stature(seed: int) -> Non
     assert -0.02 < person.height_m - person.body.stature_m < 0.09
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", seeds(12))
 def test_bending_and_crouching_make_small(seed: int) -> None:
     person = worker(seed)
     bent_m = cloud(person.person({"bend_deg": 90.0}))[:, 2].max()
@@ -92,7 +92,7 @@ def test_bending_and_crouching_make_small(seed: int) -> None:
     assert 0.45 * person.height_m < crouched_m < 0.75 * person.height_m
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", seeds(12))
 def test_a_standing_person_is_as_wide_and_deep_as_people_are(seed: int) -> None:
     person = worker(seed)
     points_m = cloud(person.person(UPRIGHT))

@@ -93,7 +93,7 @@ def error_and_sigma(result: GroundMap | NoGroundMap, k: int) -> tuple[float, flo
     return abs(length - float(np.linalg.norm(other - one))), sigma
 
 
-@pytest.mark.parametrize("stated", [False, True])
+@pytest.mark.parametrize("stated", [False, pytest.param(True, marks=pytest.mark.live)])
 def test_a_second_reference_never_makes_distances_less_sure(stated: bool) -> None:
     camera = CameraPrior.unknown(640, 360)
     alone, both = following(references()[0], camera=camera), following(*references(stated=stated), camera=camera)
@@ -106,7 +106,7 @@ def test_a_second_reference_never_makes_distances_less_sure(stated: bool) -> Non
     assert not both.description["warnings"]
 
 
-@pytest.mark.parametrize("stated", [False, True])
+@pytest.mark.parametrize("stated", [pytest.param(False, marks=pytest.mark.live), True])
 def test_while_the_first_is_hidden_the_second_holds_the_map(stated: bool) -> None:
     ground = following(*references(stated=stated))
     for k in range(2):
@@ -118,7 +118,7 @@ def test_while_the_first_is_hidden_the_second_holds_the_map(stated: bool) -> Non
         assert seen(result).age_s == 0.0 and seen(result).site_frame == 0
 
 
-@pytest.mark.parametrize("which", [0, 1])
+@pytest.mark.parametrize("which", [0, pytest.param(1, marks=pytest.mark.live)])
 def test_a_reference_that_was_moved_is_named_and_the_ground_stays(which: int) -> None:
     ground = following(*references())
     for k in range(3):

@@ -58,9 +58,10 @@ def test_the_reference_is_found_in_a_crooked_box_with_a_shadow_beside_it(shape: 
     assert np.median(found) < SOLID_PX
 
 
-def test_what_is_believed_is_never_wrong() -> None:
+@pytest.mark.parametrize("seeds", [range(10), pytest.param(range(10, 40), marks=pytest.mark.live)], ids=["few", "many"])
+def test_what_is_believed_is_never_wrong(seeds: range) -> None:
     missed = 0
-    for seed in range(40):
+    for seed in seeds:
         shape = SHAPES[seed % 3]
         rng = np.random.default_rng(100 + seed)
         state = random_state(rng, shape, CAMERA, HEIGHT_M)
@@ -70,7 +71,7 @@ def test_what_is_believed_is_never_wrong() -> None:
             missed += 1
             continue
         assert _off_px(found, shape, state) < 2.0 * SOLID_PX, f"seed {seed}"
-    assert missed <= 8
+    assert missed <= len(seeds) // 5
 
 
 def test_plain_ground_and_a_box_outside_the_picture_have_no_reference() -> None:

@@ -32,7 +32,9 @@ def measured_map(rng: np.random.Generator, lens: FloatArray | None) -> GroundMap
     return GroundMap(matrix, covariance, SIZE_PX, "four anchors", 0.02, camera=camera)
 
 
-@pytest.mark.parametrize("lens", [None, LENS], ids=["pinhole", "lens"])
+@pytest.mark.parametrize(
+    "lens", [pytest.param(None, marks=pytest.mark.live, id="pinhole"), pytest.param(LENS, id="lens")]
+)
 def test_two_thirds_of_all_distances_lie_within_one_sigma_of_the_truth(lens: FloatArray | None) -> None:
     rng = np.random.default_rng(1)
     boxes = standing(seen_px(PLACES_M, lens), width_px=30.0, height_px=50.0)

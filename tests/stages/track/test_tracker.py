@@ -114,7 +114,7 @@ def test_a_rest_of_the_detector_is_not_a_miss() -> None:
     assert tracks.observed.all()
 
 
-@examples(30)
+@examples(12)
 @given(
     st.integers(0, 2**32 - 1),
     st.floats(-40.0, 40.0),

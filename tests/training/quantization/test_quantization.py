@@ -54,7 +54,7 @@ def _quantize(
     return report, onnx.load(str(out))
 
 
-@pytest.mark.parametrize("method", ["minmax", "entropy", "percentile"])
+@pytest.mark.parametrize("method", ["minmax", pytest.param("entropy", marks=pytest.mark.live), "percentile"])
 def test_an_int8_model_finds_what_the_float_model_finds(tmp_path: Path, squares: LabelledData, method: Method) -> None:
     model = write_detector(tmp_path, passing=2)
     plan = QuantizationPlan(calibration_pictures=10, method=method)

@@ -129,7 +129,7 @@ def test_the_papers_loss_is_what_darknet_computes_cell_by_cell(seed: int) -> Non
     assert terms.total.item() == pytest.approx(box + objectness + classes, rel=FLOAT32_LOSS_REL)
 
 
-@pytest.mark.parametrize("box", ["ciou", "squared"])
+@pytest.mark.parametrize("box", ["ciou", pytest.param("squared", marks=pytest.mark.live)])
 def test_gradient_descent_on_the_heads_finds_the_truth(box: str) -> None:
     heads, batch = _raw(3), _some_truth(3)
     params = LossParams(box=box, anchor_iou=1.0)  # type: ignore[arg-type] # a Literal

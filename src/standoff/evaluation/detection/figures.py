@@ -13,7 +13,7 @@ from standoff.evaluation.detection.accuracy_time import draw_accuracy_time
 from standoff.evaluation.detection.comparison import Comparison
 from standoff.evaluation.detection.score import PRECISION, ClassScore
 from standoff.evaluation.detection.style import INK, QUIET, blank, colour_of, tidy
-from standoff.stages.sinks.whole import whole_file
+from standoff.files.whole import whole_file
 
 _PANEL_IN = (3.4, 3.3)
 _MOST_COLUMNS = 4

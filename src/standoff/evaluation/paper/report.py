@@ -25,7 +25,7 @@ from standoff.evaluation.paper.pooled import pool
 from standoff.evaluation.paper.rectified import failed_frames
 from standoff.evaluation.paper.result import ClipResult
 from standoff.evaluation.paper.snapshots import Snapshot
-from standoff.stages.sinks.whole import whole_file
+from standoff.files.whole import whole_file
 
 MOST_CHARTS = 4
 

@@ -15,6 +15,7 @@ import shapely
 from standoff.core.homography import FloatArray
 from standoff.core.pose import View
 from standoff.core.types import ImageArray
+from standoff.files.whole import whole_folder
 from standoff.labels.types import Split
 from standoff.simulation.composites.backgrounds import Background, find_backgrounds, split_backgrounds
 from standoff.simulation.composites.blending import Match, blend
@@ -33,7 +34,6 @@ from standoff.simulation.sensor import Sensor
 from standoff.simulation.soil_colours import PALETTES
 from standoff.simulation.terrain_plan import Soil
 from standoff.simulation.truth import Row, entity_rows
-from standoff.stages.sinks.whole import whole_folder
 
 _UNTOUCHED_SHARE, _DESERTED_SHARE = 0.05, 0.10
 _SMEARED_SHARE, _LONGEST_SMEAR_PX = 0.2, 6.0

@@ -13,7 +13,7 @@ from av.video.reformatter import ColorRange, Colorspace, VideoReformatter
 
 from standoff.core.errors import MissingDependency
 from standoff.core.types import ImageArray
-from standoff.stages.sinks.folder import partial_path
+from standoff.files.whole import partial_path
 
 _TIME_BASE = Fraction(1, 60_000)  # frames of 23.976 to 60 Hz last whole ticks; MPEG-4 Part 2 takes at most 65535
 _KEYFRAME_EVERY_S = 2.0

@@ -7,6 +7,7 @@ import tempfile
 from pathlib import Path
 
 from standoff.core.errors import OutputError
+from standoff.files.whole import partial_path
 
 OUTPUT_FILES: tuple[str, ...] = (
     "run.json",
@@ -28,15 +29,6 @@ def parts_folder(path: Path) -> Path:
     'tracks.parts'
     """
     return path.with_suffix(".parts")
-
-
-def partial_path(path: Path) -> Path:
-    """Return the name of a file that is not whole yet; beside the final name, so that a rename is atomic.
-
-    >>> partial_path(Path("out/run.json")).name
-    '.run.json.partial'
-    """
-    return path.with_name(f".{path.name}.partial")
 
 
 def _traces(folder: Path) -> list[Path]:

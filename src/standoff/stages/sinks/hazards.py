@@ -8,7 +8,7 @@ from pathlib import Path
 
 from standoff.core.classes import CLASSES
 from standoff.core.types import FrameResult, Hazard, Outcome
-from standoff.stages.sinks.json_text import json_line
+from standoff.files.json_text import json_line
 
 
 class HazardSink:

@@ -15,7 +15,8 @@ import numpy.typing as npt
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from standoff.stages.sinks.folder import partial_path, parts_folder
+from standoff.files.whole import partial_path
+from standoff.stages.sinks.folder import parts_folder
 
 Column = npt.NDArray[Any] | Sequence[Any]
 Columns = Mapping[str, Column]

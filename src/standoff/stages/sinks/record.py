@@ -15,8 +15,8 @@ import numpy as np
 
 from standoff import __version__
 from standoff.core.types import FrameResult, GroundMap, Hazard, NoGroundMap, Outcome, Severity
+from standoff.files.json_text import write_json
 from standoff.stages.sinks.durations import Durations
-from standoff.stages.sinks.json_text import write_json
 from standoff.stages.sinks.scene import worse
 
 _LIBRARIES = ("numpy", "scipy", "numba", "opencv-python-headless", "onnxruntime", "av", "pyarrow")

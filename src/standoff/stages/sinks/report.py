@@ -16,10 +16,9 @@ from markupsafe import Markup
 
 from standoff import __version__
 from standoff.core.types import FrameResult, Outcome
-from standoff.stages.sinks.charts import clock, pair_charts, plan_chart, site_chart
+from standoff.files.json_text import plain
+from standoff.files.whole import partial_path
 from standoff.stages.sinks.collect import HazardLife, RunSummary
-from standoff.stages.sinks.folder import partial_path
-from standoff.stages.sinks.json_text import plain
 from standoff.stages.sinks.pair_lines import distance_text
 from standoff.stages.sinks.params import ReportParams
 
@@ -72,6 +71,9 @@ class ReportSink:
 
 def render(summary: RunSummary, outcome: Outcome, descriptions: Mapping[str, Any], warning_gap_m: float) -> str:
     """Return the page."""
+    # matplotlib takes long to load; a run starts without it, and whoever imports another sink does not need it
+    from standoff.stages.sinks.charts import clock, pair_charts, plan_chart, site_chart
+
     folder = files("standoff.stages.sinks")
     environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True)
     environment.filters.update(clock=clock, percent=_percent, metres=_metres)

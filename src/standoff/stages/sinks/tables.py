@@ -19,7 +19,7 @@ from standoff.clips import COLUMNS, FOOT_COLUMNS, metadata_of
 from standoff.core.classes import CLASSES
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import FrameResult, GroundMap, IntArray, NoGroundMap, Outcome, TextArray
-from standoff.stages.sinks.json_text import plain
+from standoff.files.json_text import plain
 from standoff.stages.sinks.params import TableParams
 from standoff.stages.sinks.parquet_parts import Columns, ParquetParts
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import cv2
-import matplotlib
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
@@ -42,8 +41,10 @@ class TextSprites:
 
     def _font(self, size_px: int, bold: bool) -> ImageFont.FreeTypeFont:
         if (size_px, bold) not in self._fonts:
+            import matplotlib as mpl  # its fonts are all that is needed of it, and it takes long to load
+
             name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
-            path = Path(matplotlib.get_data_path()) / "fonts" / "ttf" / name
+            path = Path(mpl.get_data_path()) / "fonts" / "ttf" / name
             self._fonts[size_px, bold] = ImageFont.truetype(str(path), size_px)
         return self._fonts[size_px, bold]
 

@@ -11,8 +11,8 @@ from pathlib import Path
 
 from standoff.core.classes import names_by_line
 from standoff.core.errors import ModelError
+from standoff.files.whole import whole_file
 from standoff.stages.detect.model_card import INPUT_NAME, OUTPUT_NAME, POINTS_NAME, ModelCard, file_sha256
-from standoff.stages.sinks.whole import whole_file
 from standoff.training.darknet.cfg import DarknetCfg, read_cfg, read_text
 from standoff.training.darknet.shapes import check_input
 from standoff.training.required import require_packages

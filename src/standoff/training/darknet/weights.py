@@ -17,7 +17,7 @@ import torch
 from torch import Tensor
 
 from standoff.core.errors import ModelError
-from standoff.stages.sinks.whole import whole_file
+from standoff.files.whole import whole_file
 from standoff.training.darknet.network import ConvolutionBlock, DarknetNetwork
 
 Numbers: TypeAlias = np.ndarray[tuple[int], np.dtype[np.float32]]

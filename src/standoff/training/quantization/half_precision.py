@@ -15,9 +15,9 @@ import onnx
 import onnxruntime
 
 from standoff.core.errors import ModelError
+from standoff.files.whole import whole_file
 from standoff.stages.detect.model_card import INPUT_NAME, OUTPUT_NAME, ModelCard
 from standoff.stages.detect.runtime import open_session
-from standoff.stages.sinks.whole import whole_file
 from standoff.training.quantization.onnx_file import read_own_model
 
 _WEIGHTED = frozenset({"Conv", "ConvTranspose", "Gemm", "MatMul"})

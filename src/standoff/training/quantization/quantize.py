@@ -15,12 +15,12 @@ from onnxruntime.quantization.calibrate import TensorsData
 from typing_extensions import Doc
 
 from standoff.core.errors import DataError, ModelError
+from standoff.files.whole import whole_file
 from standoff.labels import LabelledData, LabelledPicture, Split, load_picture
 from standoff.labels.problems import readable_pictures
 from standoff.labels.splits import spread
 from standoff.stages.detect.letterbox import Letterbox
 from standoff.stages.frames import frame_from_array
-from standoff.stages.sinks.whole import whole_file
 from standoff.training.quantization.gate import Gate, Loss
 from standoff.training.quantization.int8 import Int8Network, Method, NetworkInput, Recipe
 from standoff.training.quantization.onnx_file import describe_as_made_from, is_quantized, read_own_model

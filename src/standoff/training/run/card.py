@@ -6,10 +6,10 @@ from typing import Any
 
 import yaml
 
+from standoff.files.json_text import plain
 from standoff.labels import LabelledData, Split
 from standoff.labels.read import CUT_GROUP
 from standoff.labels.summary import SplitSummary, summarise
-from standoff.stages.sinks.json_text import plain
 from standoff.training.run.loop import Progress
 from standoff.training.run.tables import markdown_table
 

@@ -13,11 +13,11 @@ from standoff import __version__
 from standoff.config import read_settings_file
 from standoff.core.errors import ConfigError, OutputError
 from standoff.evaluation.detection import DetectionScore
+from standoff.files.json_text import plain, write_json
+from standoff.files.whole import whole_file
 from standoff.labels import LabelledPicture
 from standoff.labels.documents import read_json
 from standoff.labels.splits import spread
-from standoff.stages.sinks.json_text import plain, write_json
-from standoff.stages.sinks.whole import whole_file
 from standoff.training.darknet.cfg import read_cfg
 from standoff.training.darknet.export import export_darknet, read_names
 from standoff.training.darknet.network import DarknetNetwork

@@ -10,13 +10,13 @@ from typing import Any, Final
 
 from standoff.core.errors import ConfigError, DataError, ModelError
 from standoff.evaluation.detection import DetectionScore
+from standoff.files.json_text import plain
 from standoff.labels import LabelledData, Problem, read_data
 from standoff.labels.near_duplicates import near_duplicates
 from standoff.labels.problems import problem_lines, readable_pictures
 from standoff.labels.splits import require_splits, spread
 from standoff.labels.summary import summarise
 from standoff.stages.detect.model_card import file_sha256
-from standoff.stages.sinks.json_text import plain
 from standoff.training.darknet.cfg import parse_cfg, read_cfg
 from standoff.training.darknet.network import DarknetNetwork
 from standoff.training.darknet.shapes import check_input

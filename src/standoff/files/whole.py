@@ -11,6 +11,15 @@ from tempfile import TemporaryDirectory
 from standoff.core.errors import OutputError
 
 
+def partial_path(path: Path) -> Path:
+    """Return the name of a file that is not whole yet; beside the final name, so that a rename is atomic.
+
+    >>> partial_path(Path("out/run.json")).name
+    '.run.json.partial'
+    """
+    return path.with_name(f".{path.name}.partial")
+
+
 @contextmanager
 def whole_file(out: Path) -> Generator[Path, None, None]:
     """Give a path to write to; the file takes its place as `out` when all went well, and leaves no trace otherwise.

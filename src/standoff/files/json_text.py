@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from standoff.stages.sinks.folder import partial_path
+from standoff.files.whole import partial_path
 
 
 def plain(value: Any) -> Any:  # noqa: ANN401

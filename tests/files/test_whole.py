@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from standoff.core.errors import OutputError
-from standoff.stages.sinks.whole import whole_file
-from standoff.stages.sinks.whole import whole_folder as any_whole_folder
+from standoff.files.whole import whole_file
+from standoff.files.whole import whole_folder as any_whole_folder
 
 whole_folder = partial(any_whole_folder, own=("a.txt", "old.txt"))
 
