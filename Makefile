@@ -56,7 +56,7 @@ test: lint contracts
 
 # pytest leaves with 5 where nothing is marked, and only then is that no failure.
 test-live: $(READY)
-	@code=0; $(BIN)/python -m pytest tests -m live || code=$$?; \
+	@code=0; OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest tests -n $(WORKERS) --dist worksteal -m live || code=$$?; \
 	if [ $$code = 5 ]; then echo "No test is marked live."; else exit $$code; fi
 
 test-processors: $(READY)
