@@ -56,6 +56,7 @@ def test_distances_through_the_reference_object_are_the_true_ones(
     settings = load_settings(
         overrides={
             "ground": {"reference": reference},
+            "locate": {"anchor": "bottom_centre"},
             "replace": {"detect": {"factory": "test_drawn_site:TrueBoxes"}},
         }
     )

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from standoff.simulation.presets import Plan
 
 Method = Literal["fused", "refined", "paper", "paper+tls", "oriented"]
-Anchor = Literal["ground_point", "class_prior", "bottom_centre", "box_centre"]
+Anchor = Literal["ground_point", "bottom_centre", "box_centre"]
 Boxes = Literal["truth", "noisy"]
 CameraFile = Literal["file", "unknown"]
 Height = Literal["known", "unknown"]

@@ -44,7 +44,7 @@ def test_two_thirds_of_all_distances_lie_within_one_sigma_of_the_truth(lens: Flo
     for _ in range(TRIALS):
         ground = measured_map(rng, lens)
         tracks = tracks_of(boxes + rng.normal(size=boxes.shape) * edge_sigma_px)
-        positions = Locator(LocateParams(edge_sigma_fraction=0.06)).update(0.0, tracks, ground)
+        positions = Locator(LocateParams("bottom_centre", edge_sigma_fraction=0.06)).update(0.0, tracks, ground)
         found = ProximityMeter(params).update(0.0, positions, ground)
         a, b = found.track_a - 1, found.track_b - 1
         truth_m = np.linalg.norm(PLACES_M[a] - PLACES_M[b], axis=1)

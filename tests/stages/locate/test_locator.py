@@ -16,6 +16,8 @@ from standoff.stages.locate.params import Anchor
 
 GROUND_M = np.array([[0.0, 35.0], [-8.0, 28.0], [12.0, 45.0], [5.0, 60.0]])
 LENS = np.array([-0.12, 0.03, 0.001, -0.0008, 0.0])
+FEET = LocateParams(anchor="bottom_centre")
+"""Exact for boxes that stand on a point, whatever is in them."""
 
 
 def box_with_foot_at(x: float, y: float) -> FloatArray:
@@ -23,7 +25,7 @@ def box_with_foot_at(x: float, y: float) -> FloatArray:
 
 
 def test_the_bottom_centre_stands_where_the_entity_does() -> None:
-    positions = Locator().update(0.0, tracks_of(standing(seen_px(GROUND_M))), ground_map())
+    positions = Locator(FEET).update(0.0, tracks_of(standing(seen_px(GROUND_M))), ground_map())
     assert positions.valid.all()
     assert (positions.reason == "").all()
     np.testing.assert_allclose(positions.xy_m, GROUND_M, rtol=GEOMETRY_REL, atol=GEOMETRY_REL)
@@ -31,9 +33,9 @@ def test_the_bottom_centre_stands_where_the_entity_does() -> None:
 
 def test_lens_distortion_is_removed_from_the_foot_point() -> None:
     tracks = tracks_of(standing(seen_px(GROUND_M, LENS)))
-    positions = Locator().update(0.0, tracks, ground_map(distortion=LENS))
+    positions = Locator(FEET).update(0.0, tracks, ground_map(distortion=LENS))
     np.testing.assert_allclose(positions.xy_m, GROUND_M, atol=GROUND_THROUGH_LENS_M)
-    bare = Locator().update(0.0, tracks, ground_map())
+    bare = Locator(FEET).update(0.0, tracks, ground_map())
     assert np.abs(bare.xy_m - GROUND_M).max() > 0.1
 
 
@@ -168,7 +170,7 @@ def test_an_anchor_between_two_edges_has_half_the_variance_of_one(
 def test_a_small_box_is_no_surer_than_a_pixel() -> None:
     boxes = standing(seen_px(GROUND_M), width_px=4.0, height_px=10.0)
     smaller = standing(seen_px(GROUND_M), width_px=2.0, height_px=5.0)
-    first, second = (Locator().update(0.0, tracks_of(b), ground_map()).covariance_m2 for b in (boxes, smaller))
+    first, second = (Locator(FEET).update(0.0, tracks_of(b), ground_map()).covariance_m2 for b in (boxes, smaller))
     np.testing.assert_array_equal(first, second)
 
 
@@ -215,7 +217,7 @@ def test_wrong_settings_are_named() -> None:
 
 
 def test_velocity_comes_from_observed_positions_and_is_unknown_where_invalid() -> None:
-    locator = Locator()
+    locator = Locator(FEET)
     for step in range(11):
         walked = GROUND_M[:1] + np.array([[1.4, 0.0]]) * (0.1 * step)
         positions = locator.update(0.1 * step, tracks_of(standing(seen_px(walked))), ground_map())
@@ -287,7 +289,7 @@ def test_a_class_prior_finds_a_solid_block_from_any_side_and_admits_what_a_box_c
         boxes.append([*seen.min(axis=0), *seen.max(axis=0)])
     truck = [3] * len(GROUND_M)
     tracks = tracks_of(np.array(boxes), class_id=truck)
-    by_prior = Locator(LocateParams(anchor="class_prior")).update(0.0, tracks, ground_map())
+    by_prior = Locator(LocateParams()).update(0.0, tracks, ground_map())
     by_bottom = Locator(LocateParams(anchor="bottom_centre")).update(0.0, tracks, ground_map())
     off_m = np.linalg.norm(by_prior.xy_m - GROUND_M, axis=1)
     assert (off_m < 0.5).all() and (off_m < 0.25 * np.linalg.norm(by_bottom.xy_m - GROUND_M, axis=1)).all()
@@ -296,7 +298,7 @@ def test_a_class_prior_finds_a_solid_block_from_any_side_and_admits_what_a_box_c
 
 def test_a_class_prior_yields_to_the_detectors_own_point_and_leaves_people_at_their_feet() -> None:
     boxes = standing(seen_px(GROUND_M))
-    prior = Locator(LocateParams(anchor="class_prior"))
+    prior = Locator(LocateParams())
     own = prior.update(0.0, _pointed(boxes, seen_px(GROUND_M), 1.0), ground_map())
     np.testing.assert_allclose(own.xy_m, GROUND_M, rtol=GEOMETRY_REL, atol=GEOMETRY_REL)
     people = prior.update(0.0, tracks_of(boxes), ground_map())

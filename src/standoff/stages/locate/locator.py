@@ -22,15 +22,15 @@ OUTSIDE_MAP = "outside the ground map"
 
 _TOP_COUNTS_BELOW = 0.9
 """Level in the box below which an anchor moves with the upper edge by more than with anything else."""
-_OWN_POINT_FIRST = frozenset({"ground_point", "class_prior"})
 
 
 class Locator:
     """Place each track of one stream on the ground.
 
     One point stands for the entity and is taken to lie on the ground plane: the detector's own ground point, whose
-    error it states, or where it gives none a point of the box. For a machine seen from above the bottom of the box is
-    its near side, not its middle: there the covariance covers the error of the box, not this.
+    error it states, or where it gives none the place in the box where things of its class usually stand. What a box
+    leaves open of a machine, two metres of an excavator, is in the covariance. Where the bottom centre of the box is
+    asked for, that is a machine's near side, not its middle, and the covariance covers the error of the box alone.
 
     Args:
         params: Settings; the defaults when left out.
@@ -112,20 +112,20 @@ class Locator:
 
     def _has_point(self, tracks: Tracks) -> BoolArray:
         """Tell (M,) which tracks are placed by their own ground point."""
-        if self._params.anchor not in _OWN_POINT_FIRST:
+        if self._params.anchor != "ground_point":
             return np.zeros(len(tracks), dtype=np.bool_)
         return np.asarray(np.isfinite(tracks.foot_px).all(axis=1))
 
     def _levels(self, tracks: Tracks, ground: GroundMap) -> FloatArray:
         """Return (M,) where the anchor lies between the upper edge of each box, 0, and its lower, 1."""
-        if self._params.anchor != "class_prior":
+        if self._params.anchor != "ground_point":
             return np.full(len(tracks), 0.5 if self._params.anchor == "box_centre" else 1.0)
         centre_px = ground.undistorted((tracks.xyxy_px[:, :2] + tracks.xyxy_px[:, 2:]) / 2.0)
         return class_prior.levels(tracks.class_id, class_prior.sines_of_view(ground, centre_px))
 
     def _prior_variance_m2(self, tracks: Tracks) -> FloatArray:
         """Return (M,) variance of each coordinate that a box leaves open, where its class says where it stands."""
-        leaves_open = ~self._has_point(tracks) & (self._params.anchor == "class_prior")
+        leaves_open = ~self._has_point(tracks) & (self._params.anchor == "ground_point")
         variance_m2: FloatArray = np.where(leaves_open, class_prior.SIGMA_M[tracks.class_id] ** 2, 0.0)
         return variance_m2
 

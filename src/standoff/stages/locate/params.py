@@ -9,7 +9,7 @@ from typing_extensions import Doc
 
 from standoff.core.classes import CLASS_BY_NAME
 
-Anchor = Literal["ground_point", "class_prior", "bottom_centre", "box_centre"]
+Anchor = Literal["ground_point", "bottom_centre", "box_centre"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,8 +20,8 @@ class LocateParams:
         Anchor,
         Doc(
             "The point that is taken to stand on the ground. ground_point: the detector's own, or where it gives none "
-            "the bottom centre of the box. class_prior: its own, or where things of the class usually stand in boxes "
-            "seen at this angle, with the error that a box leaves open. bottom_centre: always that. box_centre: the "
+            "the place where things of the class usually stand in boxes seen at this angle, with the error that a box "
+            "leaves open. bottom_centre: of the box; a machine's near side, with no error for that. box_centre: the "
             "paper's, which places a tall entity behind where it stands."
         ),
     ] = "ground_point"
