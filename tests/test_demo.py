@@ -70,6 +70,7 @@ def difference_levels(one: FloatArray, other: FloatArray) -> float:
     return float(np.abs(difference - difference.mean(axis=(0, 1))).mean())
 
 
+@pytest.mark.live
 @pytest.mark.usefixtures("opengl")
 def test_the_film_can_be_rendered_again(film: Clip) -> None:
     from standoff.simulation.presets import plan_clip

@@ -34,6 +34,7 @@ def nobody_watches_the_scale(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("standoff.config.build.ScaleWatch", lambda inner, _camera: inner)
 
 
+@pytest.mark.live
 def test_the_demo_writes_all_outputs_and_prints_how_far_off_it_is(drawn: Clip, tmp_path: Path, call: Call) -> None:
     """It runs the defaults and the paper's method on the same boxes; an earlier run is kept unless it may go."""
     out = tmp_path / "out"

@@ -28,6 +28,14 @@ def test_where_there_is_no_terminal_a_line_a_minute_tells_how_far_it_is(
     ]
 
 
+def test_nothing_is_foretold_from_the_first_steps(clock: list[float], capsys: pytest.CaptureFixture[str]) -> None:
+    with progress_bar(quiet=False, unit="frames") as bar:
+        task = bar.add_task("monitoring", total=250, rate=0.0)
+        clock[0] += 70.0
+        bar.update(task, completed=1, rate=0.014)
+    assert capsys.readouterr().err == "monitoring: 1 of 250 frames\n"
+
+
 def test_quiet_is_quiet(clock: list[float], capsys: pytest.CaptureFixture[str]) -> None:
     with progress("looking", 10, quiet=True) as step:
         for _ in range(10):

@@ -66,6 +66,7 @@ def test_the_stationary_clip_keeps_its_distance_exactly(clip: Path) -> None:
     np.testing.assert_allclose(pairs["centre_m"], 15.0, rtol=GEOMETRY_REL)
 
 
+@pytest.mark.live
 def test_the_same_seed_gives_the_same_truth_bit_for_bit_in_other_processes(clip: Path, tmp_path: Path) -> None:
     again = tmp_path / "again"
     record_clip(_plan(), again, processes=2)

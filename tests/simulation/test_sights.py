@@ -105,6 +105,7 @@ def test_some_lumps_of_many_are_the_same_lumps() -> None:
         np.testing.assert_array_equal(own, lumps.points_m[lumps.starts[theirs] :][: lumps.counts[theirs]])
 
 
+@pytest.mark.live
 @pytest.mark.usefixtures("opengl")
 def test_a_surveyed_frame_says_what_the_rendered_one_shows() -> None:
     site = build_site(plan_clip("virtual", seed=5, width_px=1280, height_px=720))

@@ -10,6 +10,8 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
 EVERY_S = 60.0
+_TELLING = 10
+"""Steps before which a rate says nothing: the first one loads and compiles what the others need."""
 
 
 class SpokenProgress(Progress):
@@ -46,7 +48,7 @@ class SpokenProgress(Progress):
         if task.total is None:
             return f"{task.description}: {task.completed:.0f} {self._unit}, {rate:.2g} a second"
         line = f"{task.description}: {task.completed:.0f} of {task.total:.0f} {self._unit}, {rate:.2g} a second"
-        if not rate > 0.0:
-            return line
+        if not rate > 0.0 or task.completed < _TELLING:
+            return f"{task.description}: {task.completed:.0f} of {task.total:.0f} {self._unit}"
         left_min = round((task.total - task.completed) / rate / 60.0)
         return f"{line}, {left_min // 60} h {left_min % 60} min left"

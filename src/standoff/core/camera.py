@@ -264,7 +264,7 @@ class CameraPrior:
 
         >>> prior = CameraPrior.unknown(1280, 720)
         >>> told = RadialDistortion(-0.1, prior.k1_sigma, float(prior.camera.matrix[0, 0]))
-        >>> prior.with_distortion(told).camera.distortion[0]
+        >>> float(prior.with_distortion(told).camera.distortion[0])
         -0.05
         """
         scale = (float(self.camera.matrix[0, 0]) / told.focal_px) ** 2

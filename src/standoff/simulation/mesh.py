@@ -103,7 +103,9 @@ class Mesh:
         linear = np.asarray(pose, dtype=np.float64)[:3, :3]
         vertices = self.vertices_m @ linear.T + np.asarray(pose)[:3, 3]
         normals = self.normals @ np.linalg.inv(linear)
-        normals /= np.sqrt(np.einsum("ij,ij->i", normals, normals))[:, None]
+        length = np.sqrt(np.einsum("ij,ij->i", normals, normals))
+        # Vertices of faces without an area have no normal.
+        normals /= np.where(length > 0.0, length, 1.0)[:, None]
         triangles = self.triangles if np.linalg.det(linear) > 0 else self.triangles[:, ::-1]
         return replace(
             self,

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from io import BytesIO
 from pathlib import Path
 from unittest.mock import patch
 
@@ -17,23 +18,25 @@ SIZE_PX = (1920, 1080)
 """No smaller than the drawn clip, so that no true box lies outside."""
 
 
-def _write_black_video(path: Path) -> None:
+def _black_film() -> bytes:
     """Nothing is looked at, and drawing takes its time."""
+    file = BytesIO()
     width_px, height_px = SIZE_PX
     black = av.VideoFrame.from_ndarray(np.zeros((height_px, width_px, 3), np.uint8), format="bgr24")
-    with av.open(str(path), "w") as container:
+    with av.open(file, "w", format="mp4") as container:
         stream = container.add_stream("h264", rate=25)
         stream.width, stream.height, stream.pix_fmt = width_px, height_px, "yuv420p"
         for number in range(drawn_clip.FRAMES):
             black.pts = number
             container.mux(stream.encode(black))
         container.mux(stream.encode(None))
+    return file.getvalue()
 
 
 @pytest.fixture(scope="session")
 def seen_clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A drawn clip whose truth says how much of everything can be seen: of the loader too little to be marked."""
-    with patch.object(drawn_clip, "_write_video", _write_black_video):
+    with patch.object(drawn_clip, "_film", _black_film):
         folder = drawn_clip.write_clip(tmp_path_factory.mktemp("seen") / "drawn")
     table = pq.read_table(folder / "truth.parquet")
     loader = [class_id == 2 for class_id in table["class_id"].to_pylist()]

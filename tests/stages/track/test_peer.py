@@ -133,6 +133,7 @@ def score(truth: Sequence[Seen], tracks: Sequence[Seen]) -> tuple[float, int]:
     return float(identity["IDF1"]), int(clear["IDSW"])
 
 
+@pytest.mark.live
 def test_ids_hold_no_worse_than_the_peers_on_simulated_detections(shared_data: Path) -> None:
     ours, peers = [], []
     for first, last in STRETCHES:
@@ -146,6 +147,7 @@ def test_ids_hold_no_worse_than_the_peers_on_simulated_detections(shared_data: P
     assert switches <= peer_switches
 
 
+@pytest.mark.live
 def test_ids_hold_no_worse_than_the_peers_on_a_real_detector(shared_data: Path) -> None:
     first, last = REAL_STRETCH
     truth = read_truth(shared_data, first, last)

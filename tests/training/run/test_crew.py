@@ -44,6 +44,7 @@ def worked(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.live
 def test_two_processes_end_with_the_same_weights_from_different_pictures(worked: Path) -> None:
     results: list[dict[str, Any]] = [torch.load(worked / f"rank{rank}", weights_only=True) for rank in (0, 1)]
     first, second = results
@@ -54,5 +55,6 @@ def test_two_processes_end_with_the_same_weights_from_different_pictures(worked:
             torch.testing.assert_close(value, second["state"][name])
 
 
+@pytest.mark.live
 def test_one_of_several_processes_writes_the_folder(worked: Path) -> None:
     assert (worked / "run" / "model.onnx").is_file()

@@ -19,7 +19,7 @@ def faults():
     for _ in range(6):
         torch.ones(12_000_000)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
-    for _ in range(30):
+    for _ in range(16):
         torch.ones(12_000_000)
     return resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before
 
@@ -29,7 +29,7 @@ print(returned, faults())
 """
 """Blocks of 48 MB: glibc never keeps those of more than 32 MB by itself.
 
-Thirty are counted, because the heap may still grow for a few when something small was put where a large one had been.
+Sixteen are counted, because the heap may still grow for a few when something small was put where a large one had been.
 """
 
 

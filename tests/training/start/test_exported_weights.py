@@ -55,6 +55,7 @@ def test_an_exported_network_comes_back_with_its_anchors_classes_and_points(
     torch.testing.assert_close(_heads(found), _heads(expected), rtol=1e-4, atol=1e-4)
 
 
+@pytest.mark.live
 def test_of_a_joined_file_the_part_of_the_same_layers_is_taken(make_darknet_files: MakeFiles, tmp_path: Path) -> None:
     texts = yolov3_tiny_cfg(3, 64, 64), efficientnet_lite0_cfg(3, 64, 64, _OTHER_PX)
     parts = []
