@@ -97,7 +97,8 @@ def _with_height(belief: Belief, height_m: float, sigma_m: float) -> Belief:
     information[HEIGHT, HEIGHT] += sigma_m**-2
     pull = np.zeros(len(information))
     pull[HEIGHT] = (height_m - belief.state.height_m) / sigma_m**2
-    return Belief(belief.state.changed(np.linalg.solve(information, pull)), information)
+    change = np.asarray(np.linalg.solve(information, pull), dtype=np.float64)
+    return Belief(belief.state.changed(change), information)
 
 
 def _height_sigma_m(belief: Belief) -> float:
@@ -125,7 +126,7 @@ def height_by_hue(bgr: ImageArray, shape: ReferenceShape, state: SolidState) -> 
     heights_m = np.arange(_STEP_M, _HIGHEST_M, _STEP_M)
     sides = [
         side
-        for side in np.flatnonzero(facing_sides(shape, state.view))
+        for side in np.flatnonzero(facing_sides(shape, state.view)).tolist()
         if _Side.of(shape, state, np.array([_USUAL_M]), side).gap_px[0] >= _LEAST_SIDE_PX
     ]
     if not sides:
@@ -189,7 +190,8 @@ class _Hues:
 
     def change_across(self, side: _Side) -> FloatArray:
         """Return (G,) the chi-square of the difference between the hues inside and outside of each line."""
-        return np.sum([self._change(values, side) ** 2 for values in self.values], axis=0)
+        changes = np.array([self._change(values, side) for values in self.values])
+        return np.asarray((changes**2).sum(axis=0))
 
     def brighter_outside(self, side: _Side) -> FloatArray:
         """Return (G,) by how many standard errors it is brighter outside of each line than inside."""

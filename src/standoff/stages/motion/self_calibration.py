@@ -85,15 +85,15 @@ class SelfCalibration:
         self, source_px: FloatArray, target_px: FloatArray, inlier_px: float, followed_px: float
     ) -> tuple[float, float] | None:
         """Return k1 and its standard error, or None where the points do not move like a plane's under any lens."""
-        k1 = self.told.k1 if self.told is not None else 0.0
+        k1, sigma = self.told.k1 if self.told is not None else 0.0, np.inf
         for _ in range(_ROUNDS):
             step = self._step(k1, source_px, target_px, inlier_px, followed_px)
             if step is None or abs(k1 + step[0]) > _MOST:
                 return None
-            k1 += step[0]
+            k1, sigma = k1 + step[0], step[1]
             if abs(step[0]) < _CONVERGED:
                 break
-        return k1, step[1]
+        return k1, sigma
 
     def _step(
         self, k1: float, source_px: FloatArray, target_px: FloatArray, inlier_px: float, followed_px: float

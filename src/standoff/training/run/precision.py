@@ -12,7 +12,7 @@ def knows_bf16(device: torch.device) -> bool:
     with AVX2 takes several times as long as in float32.
     """
     if device.type == "cuda":
-        return torch.cuda.is_bf16_supported()
+        return bool(torch.cuda.is_bf16_supported())
     if device.type != "cpu":
         return False
     capabilities = torch.cpu.get_capabilities()
