@@ -3,7 +3,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
-from drawn_solid import base_px, box_around, drawn, lens, random_state, top_px
+from drawn_solid import base_px, box_around, drawn, lens, looking_at, random_state, top_px
 from tolerances import SOLID_PX
 
 from standoff.core.camera import CameraPrior
@@ -52,6 +52,15 @@ def test_the_foot_is_where_the_hue_changes_in_the_sun_and_in_the_shade(
     found = height_by_hue(coloured(gray, state), SQUARE, guessed(state))
     assert found is not None
     assert abs(found[0] - height_m) < 2.0 * found[1], (found, height_m)
+
+
+@pytest.mark.parametrize("away_m", [5.0, 18.0])
+def test_the_foot_is_found_from_near_and_from_afar(away_m: float) -> None:
+    view = looking_at(CAMERA, (1.25, 1.25), away_m=away_m, heading_deg=25.0, pitch_deg=45.0)
+    state = SolidState(view, 0.5)
+    found = height_by_hue(coloured(drawn(SQUARE, state, dusk=True), state), SQUARE, guessed(state))
+    assert found is not None
+    assert abs(found[0] - 0.5) < 2.0 * found[1], found
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -13,7 +13,7 @@ from typing import Final
 import cv2
 import numpy as np
 
-from standoff.core.homography import FloatArray
+from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.pose import View
 from standoff.core.types import ImageArray
 from standoff.stages.ground.projection import project
@@ -23,7 +23,9 @@ from standoff.stages.ground.solid_choice import Found
 from standoff.stages.ground.solid_fit import Belief, fit_solid
 
 _HIGHEST_M: Final = 1.5
-_STEP_M: Final = 0.03
+_MOST_STEP_M, _MOST_STEP_PX = 0.03, 1.0
+"""Heights are tried in steps of no more than both, the second as it is seen."""
+
 _ALONG: Final = np.linspace(0.06, 0.94, 60)
 _ACROSS_PX: Final = 1.5
 """Hue is compared so far inside and outside of a line: a compressed picture has half as many pixels of colour."""
@@ -123,25 +125,27 @@ def height_by_hue(bgr: ImageArray, shape: ReferenceShape, state: SolidState) -> 
     Returns:
         Its height and the standard error of that, m; None where no change of hue, or no clear one, is seen.
     """
-    heights_m = np.arange(_STEP_M, _HIGHEST_M, _STEP_M)
-    sides = [
-        side
+    usual_px = {
+        side: float(_Side.of(shape, state, np.array([_USUAL_M]), side).gap_px[0])
         for side in np.flatnonzero(facing_sides(shape, state.view)).tolist()
-        if _Side.of(shape, state, np.array([_USUAL_M]), side).gap_px[0] >= _LEAST_SIDE_PX
-    ]
+    }
+    sides = [side for side, gap_px in usual_px.items() if gap_px >= _LEAST_SIDE_PX]
     if not sides:
         return None
+    step_m = min(_MOST_STEP_M, _MOST_STEP_PX * _USUAL_M / max(usual_px.values()))
+    heights_m = np.arange(step_m, _HIGHEST_M, step_m)
     looks = [_Side.of(shape, state, heights_m, side) for side in sides]
     first = max(int(np.searchsorted(look.gap_px, _LEAST_GAP_PX)) for look in looks)
-    lines_px = np.concatenate([look.line_px.reshape(-1, 2) for look in looks])
-    if first >= len(heights_m) or not np.isfinite(lines_px).all():
+    inside = np.all([look.is_inside(bgr.shape) for look in looks], axis=0)
+    # Feet that would lie outside the picture are not looked for.
+    last = len(inside) if inside.all() else int(inside.argmin())
+    if first >= last:
         return None
-    hues = _hues(bgr, lines_px)
-    if hues is None:
-        return None
+    looks = [look.between(first, last) for look in looks]
+    hues = _hues(bgr, np.concatenate([look.line_px.reshape(-1, 2) for look in looks]))
     change = np.sum([hues.change_across(look) for look in looks], axis=0)
     brighter = np.max([hues.brighter_outside(look) for look in looks], axis=0)
-    return _first_change(heights_m[first:], change[first:], brighter[first:])
+    return _first_change(heights_m[first:last], change, brighter)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -172,6 +176,17 @@ class _Side:
         across = np.column_stack([-direction[:, 1], direction[:, 0]]) / np.linalg.norm(direction, axis=1)[:, None]
         gap_px = ((line_px - upper_px) * across[:, None]).sum(axis=2).mean(axis=1)
         return cls(line_px, across * np.sign(gap_px)[:, None], np.abs(gap_px))
+
+    def is_inside(self, shape: tuple[int, ...]) -> BoolArray:
+        """Return (G,) whether the whole line and what is compared beside it lie in a picture (H, W, ...)."""
+        with np.errstate(invalid="ignore"):
+            inside = (self.line_px >= _MARGIN_PX) & (self.line_px <= np.array(shape[1::-1]) - 1.0 - _MARGIN_PX)
+        return np.asarray(inside.all(axis=(1, 2)))
+
+    def between(self, first: int, last: int) -> _Side:
+        """Return it for some of the heights."""
+        some = slice(first, last)
+        return _Side(self.line_px[some], self.outward[some], self.gap_px[some])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -211,12 +226,10 @@ class _Hues:
         return np.asarray(cv2.remap(values, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), dtype=np.float64)
 
 
-def _hues(bgr: ImageArray, points_px: FloatArray) -> _Hues | None:
-    """Return the hues around points, or None where some of them lie outside the picture."""
+def _hues(bgr: ImageArray, points_px: FloatArray) -> _Hues:
+    """Return the hues around points in the picture."""
     low = np.floor(points_px.min(axis=0)).astype(int) - _MARGIN_PX
     high = np.ceil(points_px.max(axis=0)).astype(int) + _MARGIN_PX + 1
-    if (low < 0).any() or high[0] > bgr.shape[1] or high[1] > bgr.shape[0]:
-        return None
     parts = cv2.cvtColor(bgr[low[1] : high[1], low[0] : high[0]], cv2.COLOR_BGR2YCrCb).astype(np.float32)
     brightness = cv2.GaussianBlur(parts[..., 0], (0, 0), _SMOOTH_PX) + _DARK
     values = tuple(
@@ -242,7 +255,7 @@ def _first_change(heights_m: FloatArray, change: FloatArray, brighter: FloatArra
         if change[top].max() > change[at]:
             continue
         middle_m = float(np.average(heights_m[top], weights=change[top]))
-        width_m = float(heights_m[top][-1] - heights_m[top][0]) + _STEP_M
+        width_m = float(heights_m[top.stop] - heights_m[top.start])
         sigma_m = max(_SIGMA_WIDTHS * width_m, _LEAST_SIGMA_M)
         if change[at] < _LEAST_SHARE * change[at:].max() or brighter[top].max() > _MOST_BRIGHTER:
             return None
