@@ -5,9 +5,10 @@ import sys
 
 import numpy as np
 import pytest
+from numba import njit
 from tolerances import GEOMETRY_REL
 
-from standoff.core.compiled import solved
+from standoff.core.compiled import solved, when_compiling
 
 PROGRAM = """
 from numba.core import caching
@@ -26,6 +27,17 @@ assert ratio(1.0, 0.0) == float("inf")
 def test_without_a_folder_for_compiled_code_it_is_compiled_anew() -> None:
     done = subprocess.run([sys.executable, "-c", PROGRAM], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_who_waits_for_something_to_be_compiled_is_told_once_and_not_of_what_is_compiled_already() -> None:
+    told: list[str] = []
+    when_compiling(lambda: told.append("compiling"))
+    solved(np.eye(2), np.ones((2, 1)))
+    before = len(told)
+    for constant in (1.0, 2.0):
+        assert njit(lambda value, constant=constant: value + constant)(1.0) == 1.0 + constant
+        assert told == ["compiling"]
+    assert before <= 1
 
 
 @pytest.mark.parametrize("size", [2, 6, 9])

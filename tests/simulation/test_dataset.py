@@ -16,7 +16,7 @@ from pycocotools.coco import COCO
 
 from standoff.core.classes import CLASSES
 from standoff.core.errors import ConfigError, OutputError
-from standoff.labels import read_data
+from standoff.labels import LabelledPicture, read_data
 from standoff.labels.types import SPLITS
 from standoff.labels.views import read_views
 from standoff.simulation.dataset import DatasetPlan, record_dataset
@@ -33,11 +33,18 @@ _ROUNDED_PX = 1e-3
 
 @pytest.fixture(scope="session")  # of one worker, wherever its turn to run the tests of this file comes
 def sets(opengl: None, tmp_path_factory: pytest.TempPathFactory) -> SimpleNamespace:
-    """Render the same pictures in both layouts, with one process and with two."""
-    root = tmp_path_factory.mktemp("sets")
-    record_dataset(_PLAN, root / "yolo", processes=1)
-    record_dataset(replace(_PLAN, layout="coco"), root / "coco", processes=2)
-    return SimpleNamespace(yolo=root / "yolo", coco=root / "coco")
+    """Render some pictures with one process."""
+    folder = tmp_path_factory.mktemp("sets") / "yolo"
+    record_dataset(_PLAN, folder, processes=1)
+    return SimpleNamespace(yolo=folder)
+
+
+@pytest.fixture(scope="session")
+def other(opengl: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Render the same pictures in the other layout, with two processes."""
+    folder = tmp_path_factory.mktemp("sets") / "coco"
+    record_dataset(replace(_PLAN, layout="coco"), folder, processes=2)
+    return folder
 
 
 def _yolo_boxes(folder: Path) -> dict[str, list[tuple[int, np.ndarray[Any, Any]]]]:
@@ -51,6 +58,11 @@ def _yolo_boxes(folder: Path) -> dict[str, list[tuple[int, np.ndarray[Any, Any]]
             for kind, share in numbers
         ]
     return boxes
+
+
+def _pictures(folder: Path) -> dict[str, LabelledPicture]:
+    splits = read_data(folder).splits.values()
+    return {picture.path.stem: picture for pictures in splits for picture in pictures}
 
 
 def _coco(folder: Path, capsys: pytest.CaptureFixture[str]) -> Iterator[tuple[str, COCO]]:
@@ -78,42 +90,47 @@ def test_yolo_boxes_are_inside_their_pictures(sets: SimpleNamespace) -> None:
         assert left + width < _SIZE_PX[0] + _ROUNDED_PX and top + height < _SIZE_PX[1] + _ROUNDED_PX
 
 
+@pytest.mark.live
 def test_both_layouts_and_any_number_of_processes_give_the_same_boxes(
-    sets: SimpleNamespace, capsys: pytest.CaptureFixture[str]
+    sets: SimpleNamespace, other: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     yolo = _yolo_boxes(sets.yolo)
     pictures = set()
-    for _, coco in _coco(sets.coco, capsys):
+    for _, coco in _coco(other, capsys):
         for image in coco.loadImgs(coco.getImgIds()):
             entries = coco.loadAnns(coco.getAnnIds(imgIds=image["id"]))
             mine = yolo[Path(image["file_name"]).stem]
             assert [kind + 1 for kind, _ in mine] == [entry["category_id"] for entry in entries]
             for (_, box), entry in zip(mine, entries, strict=True):
                 np.testing.assert_allclose(box, entry["bbox"], atol=_ROUNDED_PX)
-            first, second = (folder / image["file_name"] for folder in (sets.yolo, sets.coco))
+            first, second = (folder / image["file_name"] for folder in (sets.yolo, other))
             assert first.read_bytes() == second.read_bytes()
             pictures.add(first.stem)
     assert pictures == set(yolo)
 
 
-def test_both_layouts_have_the_same_ground_points_and_every_picture_its_view(sets: SimpleNamespace) -> None:
-    yolo, coco = (
-        {picture.path.stem: picture for pictures in read_data(folder).splits.values() for picture in pictures}
-        for folder in (sets.yolo, sets.coco)
-    )
-    assert len(yolo) == len(coco) == _PLAN.images
+@pytest.mark.live
+def test_both_layouts_have_the_same_ground_points(sets: SimpleNamespace, other: Path) -> None:
+    yolo, coco = _pictures(sets.yolo), _pictures(other)
+    assert len(yolo) == len(coco)
     for stem, picture in yolo.items():
         np.testing.assert_allclose(picture.foot_px, coco[stem].foot_px, atol=_ROUNDED_PX)
-        assert np.isfinite(picture.foot_px).all(), "of everybody in front of the camera the point is known"
+
+
+def test_of_everybody_the_ground_point_is_known_and_of_every_picture_the_view(sets: SimpleNamespace) -> None:
+    yolo = _pictures(sets.yolo)
+    assert len(yolo) == _PLAN.images
+    assert all(np.isfinite(picture.foot_px).all() for picture in yolo.values())
     views = read_views(sets.yolo / "views.jsonl")
     assert set(views) == {picture.path.name for picture in yolo.values()}
     assert all(np.isfinite(views[picture.path.name].to_ground(picture.foot_px)).all() for picture in yolo.values())
 
 
-def test_pycocotools_knows_every_class_and_picture(sets: SimpleNamespace, capsys: pytest.CaptureFixture[str]) -> None:
-    for split, coco in _coco(sets.coco, capsys):
+@pytest.mark.live
+def test_pycocotools_knows_every_class_and_picture(other: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for split, coco in _coco(other, capsys):
         assert {c["name"] for c in coco.loadCats(coco.getCatIds())} == {c.name for c in CLASSES}
-        files = {path.name for path in (sets.coco / "images" / split).iterdir()}
+        files = {path.name for path in (other / "images" / split).iterdir()}
         assert {Path(image["file_name"]).name for image in coco.loadImgs(coco.getImgIds())} == files
         assert all((image["width"], image["height"]) == _SIZE_PX for image in coco.loadImgs(coco.getImgIds()))
 

@@ -39,6 +39,7 @@ def test_daylight_is_exposed_to_the_middle_of_the_scale(condition: Condition, se
     assert np.mean(image == 255) < 0.03
 
 
+@pytest.mark.live
 def test_some_sites_have_a_tower_crane_and_bare_ones_and_the_checkerboard_have_none() -> None:
     cranes = [_is_under_a_crane(_site("lost-reference", seed)) for seed in range(8)]
     assert 1 <= sum(cranes) <= 7

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import ParamSpec, TypeVar
 
 from numba import njit
+from numba.core import event
 
 from standoff.core.homography import FloatArray
 
@@ -27,6 +28,24 @@ def compiled(function: Callable[P, R]) -> Callable[P, R]:
     except RuntimeError:
         cached = njit(error_model="numpy")(function)
     return cached
+
+
+def when_compiling(say: Callable[[], None]) -> None:
+    """Call something once, as soon as a function has to be compiled: after an installation that takes half a minute."""
+    event.register("numba:compile", _Once(say))
+
+
+class _Once(event.Listener):  # type: ignore[misc]  # numba has no types
+    def __init__(self, say: Callable[[], None]) -> None:
+        self._say: Callable[[], None] | None = say
+
+    def on_start(self, compiling: object) -> None:
+        if self._say is not None:
+            self._say()
+            self._say = None
+
+    def on_end(self, compiled: object) -> None:
+        """Do nothing: that it goes on is seen."""
 
 
 @compiled
