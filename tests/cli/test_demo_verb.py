@@ -13,6 +13,9 @@ from standoff.evaluation.paper import Clip, load_clip
 from standoff.evaluation.paper.truth_detector import TrueBoxes
 
 
+pytestmark = pytest.mark.live  # each goes through a whole film
+
+
 @pytest.fixture(scope="module")
 def drawn_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return drawn_clip.write_clip(tmp_path_factory.mktemp("clips") / "drawn")
@@ -34,7 +37,6 @@ def nobody_watches_the_scale(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("standoff.config.build.ScaleWatch", lambda inner, _camera: inner)
 
 
-@pytest.mark.live
 def test_the_demo_writes_all_outputs_and_prints_how_far_off_it_is(drawn: Clip, tmp_path: Path, call: Call) -> None:
     """It runs the defaults and the paper's method on the same boxes; an earlier run is kept unless it may go."""
     out = tmp_path / "out"
@@ -81,7 +83,6 @@ def test_a_broken_installation_is_one_line(drawn: Clip, tmp_path: Path, call: Ca
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.live
 def test_the_shipped_detector_sees_the_breach_and_the_near_miss(tmp_path: Path, call: Call) -> None:
     assert call("demo", "--out", tmp_path / "out", "--json", tmp_path / "found.json")[0] == 0
     found = json.loads((tmp_path / "found.json").read_text())

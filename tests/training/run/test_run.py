@@ -102,6 +102,7 @@ def test_labels_with_ground_points_give_heads_that_learn_them(finished: tuple[Ru
     assert 0.0 < losses[-1] < losses[0]
 
 
+@pytest.mark.live
 def test_the_run_can_be_repeated_from_its_own_record(finished: tuple[RunPlan, Path, _Heard], tmp_path: Path) -> None:
     plan, out, heard = finished
     recorded = read_run(out)
