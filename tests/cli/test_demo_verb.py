@@ -12,7 +12,6 @@ from evaluation.paper.test_paper_recorded import record_truth
 from standoff.evaluation.paper import Clip, load_clip
 from standoff.evaluation.paper.truth_detector import TrueBoxes
 
-
 pytestmark = pytest.mark.live  # each goes through a whole film
 
 
