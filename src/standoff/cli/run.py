@@ -213,9 +213,6 @@ class _StopRequest:
         signal.signal(number, signal.SIG_DFL)
 
 
-COMPILING = "compiling the geometry for this processor: half a minute, once"
-
-
 def watch(opened: Run, *, quiet: bool, on_result: Callable[[FrameResult], None] | None = None) -> None:
     """Go through a run with a progress bar; Ctrl-C ends it after the frame in hand.
 
@@ -231,7 +228,7 @@ def watch(opened: Run, *, quiet: bool, on_result: Callable[[FrameResult], None] 
     results = iter(opened)
     with closing(results), progress_bar(quiet=quiet) as bar:
         if not quiet and bar.console.is_terminal:
-            when_compiling(lambda: bar.console.print(COMPILING))
+            when_compiling(lambda: bar.console.print("compiling the geometry for this processor: half a minute, once"))
         task = bar.add_task("monitoring", total=opened.source.frame_count, rate=0.0)
         started = monotonic()
         for count, result in enumerate(results, start=1):

@@ -47,8 +47,8 @@ class SpokenProgress(Progress):
         rate = float(task.fields["rate"])
         if task.total is None:
             return f"{task.description}: {task.completed:.0f} {self._unit}, {rate:.2g} a second"
-        line = f"{task.description}: {task.completed:.0f} of {task.total:.0f} {self._unit}, {rate:.2g} a second"
+        line = f"{task.description}: {task.completed:.0f} of {task.total:.0f} {self._unit}"
         if not rate > 0.0 or task.completed < _TELLING:
-            return f"{task.description}: {task.completed:.0f} of {task.total:.0f} {self._unit}"
+            return line
         left_min = round((task.total - task.completed) / rate / 60.0)
-        return f"{line}, {left_min // 60} h {left_min % 60} min left"
+        return f"{line}, {rate:.2g} a second, {left_min // 60} h {left_min % 60} min left"

@@ -202,7 +202,7 @@ class PoseFilter:
         """
         assert self._now is not None, "predicted first"
         weighted = gradient / sigma**2
-        self._absorb(_inverse(self._now.covariance), np.outer(gradient, weighted), weighted * off)
+        self._absorb(self._now.information, np.outer(gradient, weighted), weighted * off)
 
     def _absorb(self, before: FloatArray, information: FloatArray, pull: FloatArray) -> None:
         """Correct this frame's belief and the keyframe's.

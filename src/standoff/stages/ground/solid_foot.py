@@ -21,6 +21,7 @@ from standoff.stages.ground.shape import ReferenceShape
 from standoff.stages.ground.solid import HEIGHT, SolidState, facing_sides
 from standoff.stages.ground.solid_choice import Found
 from standoff.stages.ground.solid_fit import Belief, fit_solid
+from standoff.stages.ground.solid_search import HeightPrior
 
 _HIGHEST_M: Final = 1.5
 _MOST_STEP_M, _MOST_STEP_PX = 0.03, 1.0
@@ -30,7 +31,7 @@ _ALONG: Final = np.linspace(0.06, 0.94, 60)
 _ACROSS_PX: Final = 1.5
 """Hue is compared so far inside and outside of a line: a compressed picture has half as many pixels of colour."""
 
-_USUAL_M: Final = 0.35
+_USUAL_M: Final = HeightPrior.unknown().height_m
 _LEAST_SIDE_PX: Final = 3.0
 """A side that would look narrower than this at the usual height tells nothing."""
 

@@ -99,9 +99,11 @@ class SelfCalibration:
         self, k1: float, source_px: FloatArray, target_px: FloatArray, inlier_px: float, followed_px: float
     ) -> tuple[float, float] | None:
         """Return by how much k1 should change so that one plane explains the motion best, and how sure that is."""
-        source, target = self._undistorted(source_px, k1), self._undistorted(target_px, k1)
-        source_by_k1 = (self._undistorted(source_px, k1 + _STEP) - source) / _STEP
-        target_by_k1 = (self._undistorted(target_px, k1 + _STEP) - target) / _STEP
+        both_px = np.concatenate([source_px, target_px])
+        both = self._undistorted(both_px, k1)
+        by_k1 = (self._undistorted(both_px, k1 + _STEP) - both) / _STEP
+        source, target = np.split(both, 2)
+        source_by_k1, target_by_k1 = np.split(by_k1, 2)
         known = np.isfinite(np.column_stack([source, target, source_by_k1, target_by_k1])).all(axis=1)
         plane = fit_plane(
             source[known],
