@@ -80,7 +80,6 @@ def test_the_command_line_wins_over_the_environment_and_that_over_the_file(
         ("ground: {reference: {sides_m: [1, 1, 1, 1]}}\n", "sides_m and diagonal_m go together"),
         ("ground: {reference: {corners_m: [[0, 0], [1, 0]]}}\n", "at least 3"),
         ("ground: {reference: {regular_m: [5.5, 1]}}\n", "integer"),
-        ("ground: {reference: {square_m: 2.89}, survey: a.yaml}\n", "either survey or reference"),
         ("- a\n- b\n", "list"),
         ("a: [\n", "YAML"),
         ("replace: {detect: {factory: nonsense}}\n", "factory"),

@@ -116,24 +116,28 @@ def build_ground(settings: Settings, known: CameraPrior | None = None) -> Ground
     camera = _configured_camera(settings)
     prior = known if camera is None else CameraPrior.calibrated(camera)
     ground = settings.ground
-    if ground.survey is not None:
-        if ground.markers:
-            raise _unread("ground.markers", "a survey")
-        return ScaleWatch(load_survey(ground.survey, camera=camera), prior)
     given = ground.references
+    survey = None if ground.survey is None else load_survey(ground.survey, camera=camera)
+    if survey is not None and camera is None and survey.camera is not None:
+        prior = CameraPrior.calibrated(survey.camera)
+    if survey is not None and survey.time_s is None and not (given or ground.markers):
+        return ScaleWatch(survey, prior)
+    if given and given[0].params.method != "fused" and survey is not None:
+        raise _unread("ground.survey", f"the method {given[0].params.method}")
     if given and given[0].params.method not in ("fused", "refined"):
         if len(given) > 1 or ground.markers:
             raise _unread("more references or ground.markers", f"the method {given[0].params.method}")
-        one = _reference(given[0], first=True)
+        one = _reference(given[0], defines_frame=True)
         return ScaleWatch(ReferenceGround(one.shape, one.params, place=one.place, camera=camera), prior)
-    if not (given or ground.auto or ground.markers):
+    if not (given or ground.auto or ground.markers or survey):
         return Unmapped()
     fused = FusedGround(
-        [_reference(one, first=k == 0) for k, one in enumerate(given)],
+        [_reference(one, defines_frame=k == 0 and survey is None) for k, one in enumerate(given)],
         build_marker_observer(settings),
+        survey=survey,
         camera=prior,
         # Beside something of known size, people's sizes watch over the scale; alone they would be a guess beside it.
-        params=FusedParams(telemetry=ground.auto, sizes=ground.auto and not given),
+        params=FusedParams(telemetry=ground.auto, sizes=ground.auto and not given and survey is None),
         remember=not given or given[0].params.method == "fused",
     )
     return ScaleWatch(fused, prior)
@@ -148,13 +152,13 @@ def _unread(what: str, beside: str) -> ConfigError:
     )
 
 
-def _reference(settings: ReferenceSettings, *, first: bool) -> Reference:
+def _reference(settings: ReferenceSettings, *, defines_frame: bool) -> Reference:
     return Reference(
         settings.shape(),
         settings.height_m,
         GivenPlace(settings.box_px, settings.box_time_s, settings.first_corner_px),
         settings.params,
-        place_known=first or settings.corners_m is not None,
+        place_known=defines_frame or settings.corners_m is not None,
     )
 
 

@@ -111,7 +111,13 @@ class GroundSettings(_Section):
         ),
     ] = True
 
-    survey: Annotated[Path | None, Field(description="YAML file of surveyed points, for a fixed camera.")] = None
+    survey: Annotated[
+        Path | None,
+        Field(
+            description="YAML file of surveyed points. Of a fixed camera; where the camera moves, of one picture: with "
+            "time_s in the file, or beside reference objects and markers."
+        ),
+    ] = None
     reference: Annotated[
         ReferenceSettings | None,
         Field(
@@ -123,7 +129,7 @@ class GroundSettings(_Section):
         tuple[ReferenceSettings, ...],
         Field(
             description="Further reference objects. One with corners_m lies there in the site frame; another stands "
-            "wherever it is seen."
+            "wherever it is seen, and so does the first one beside a survey."
         ),
     ] = ()
     markers: Annotated[
@@ -137,8 +143,6 @@ class GroundSettings(_Section):
 
     @model_validator(mode="after")
     def _one_source(self) -> GroundSettings:
-        if self.survey is not None and self.reference is not None:
-            raise ValueError("give either survey or reference, not both")
         if self.more_references and self.reference is None:
             raise ValueError("more_references need a reference, which says where the site frame is")
         if len({one.params.method for one in self.references}) > 1:
@@ -148,7 +152,7 @@ class GroundSettings(_Section):
 
     @property
     def references(self) -> tuple[ReferenceSettings, ...]:
-        """All reference objects; the first says where the site frame is."""
+        """All reference objects, the most important one first."""
         return () if self.reference is None else (self.reference, *self.more_references)
 
 

@@ -17,7 +17,7 @@ from standoff.core.types import CameraMotion, Detections, Frame, GroundMap, Imag
 from standoff.evaluation.drawn_markers import Hardship, draw_marker, through_camera
 from standoff.stages.ground import FusedGround, FusedParams, MarkerObserver, MarkerPlace, marker_pattern
 from standoff.stages.ground.marker_fit import agrees
-from standoff.stages.ground.marker_landmarks import NO_MARKER
+from standoff.stages.ground.marker_observer import NO_MARKER
 from standoff.stages.ground.sizes_view import CONTRADICTION, FEW_PEOPLE
 
 CAMERA = Camera(640, 480, np.array([[600.0, 0.0, 319.5], [0.0, 600.0, 239.5], [0.0, 0.0, 1.0]]), np.zeros(5))

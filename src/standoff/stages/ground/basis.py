@@ -61,6 +61,7 @@ def markers_basis(places: Sequence[MarkerPlace]) -> str:
 
 BETTER: Mapping[str, str] = {
     "reference": "a larger reference, its height above the ground, and a camera file make it better",
+    "survey": "more points, spread over the whole picture, and a camera file make it better",
     "markers": "a camera file, and a second marker far from the first, make it better",
     "telemetry": "a printed marker or a reference object of known size makes it better",
     "sizes": "a printed marker, a reference object of known size or the drone's log makes it better",
@@ -83,14 +84,15 @@ class BasisTally:
     Args:
         shapes: Of the references.
         places: Of the markers.
+        surveyed: How many points were surveyed.
 
     Attributes:
         most_people: That were measured by at once.
         why_none: The last reason for which there was no map.
     """
 
-    def __init__(self, shapes: Sequence[ReferenceShape], places: Sequence[MarkerPlace]) -> None:
-        self._shapes, self._places = shapes, places
+    def __init__(self, shapes: Sequence[ReferenceShape], places: Sequence[MarkerPlace], surveyed: int) -> None:
+        self._shapes, self._places, self._surveyed = shapes, places, surveyed
         self._maps: Counter[str] = Counter()
         self._sigmas: dict[str, float] = defaultdict(float)
         self.most_people = 0
@@ -107,7 +109,8 @@ class BasisTally:
             return "; ".join(f"{self._text(one, camera)}: {self._expected(one)}" for one, _ in self._maps.most_common())
         if self.why_none:
             return f"nothing: {self.why_none}"
-        stated = ["reference"] * bool(self._shapes) + ["markers"] * bool(self._places)
+        given = {"survey": self._surveyed, "reference": self._shapes, "markers": self._places}
+        stated = [source for source, told in given.items() if told]
         told = " and ".join(self._text(one, camera) for one in stated)
         return f"{told}, not seen yet" if told else "not known before the first frame"
 
@@ -117,6 +120,8 @@ class BasisTally:
         return BETTER[self._maps.most_common(1)[0][0]] if self._maps else HELP
 
     def _text(self, source: str, camera: CameraPrior | None) -> str:
+        if source == "survey":
+            return f"{self._surveyed} surveyed points, {lens_text(camera)}"
         if source == "reference":
             return f"{' and '.join(map(reference_basis, self._shapes))}, {lens_text(camera)}"
         if source == "markers":

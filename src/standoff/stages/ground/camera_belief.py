@@ -18,8 +18,8 @@ from standoff.stages.ground.solid import STATE, SolidState
 from standoff.stages.ground.solid_fit import Belief
 from standoff.stages.ground.view_prior import belief_of, in_frame_of
 
-Source = Literal["reference", "markers", "telemetry", "sizes"]
-LANDMARKS: tuple[Source, ...] = ("reference", "markers")
+Source = Literal["reference", "survey", "markers", "telemetry", "sizes"]
+LANDMARKS: tuple[Source, ...] = ("reference", "survey", "markers")
 STATED = "stated"
 """The site frame that references and markers of stated places share."""
 
@@ -102,7 +102,7 @@ class CameraBelief:
 
     @property
     def by_landmark(self) -> bool:
-        """Whether it rests on references or markers."""
+        """Whether it rests on references, surveyed points or markers."""
         return self.source in LANDMARKS
 
     @property
@@ -113,7 +113,7 @@ class CameraBelief:
 
     @property
     def lens(self) -> CameraPrior:
-        """What is known of the lens, by references and markers too."""
+        """What is known of the lens, by landmarks too."""
         now = self.now
         if now is None or not self.by_landmark:
             return self._prior

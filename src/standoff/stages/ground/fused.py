@@ -16,15 +16,17 @@ from standoff.core.types import CameraMotion, Detections, Frame, GroundMap, NoCa
 from standoff.stages.ground.basis import HELP, BasisTally
 from standoff.stages.ground.camera_belief import CameraBelief, Moment
 from standoff.stages.ground.last_resorts import LastResorts
-from standoff.stages.ground.marker_landmarks import MarkerLandmarks
 from standoff.stages.ground.marker_observer import MarkerObserver
 from standoff.stages.ground.params import FusedParams
+from standoff.stages.ground.point_landmarks import PointLandmarks
 from standoff.stages.ground.pose_filter import Estimate
 from standoff.stages.ground.pose_map import map_from_view, middle_scale_m_per_px
 from standoff.stages.ground.prior_for import prior_for
 from standoff.stages.ground.reference import rectified_scale_m_per_px
 from standoff.stages.ground.reference_landmarks import ReferenceLandmarks
 from standoff.stages.ground.solid_observer import Reference, SolidObserver
+from standoff.stages.ground.survey_observer import SurveyObserver
+from standoff.stages.ground.surveyed import SurveyedGround
 
 NOT_SURE = "lengths on the ground are not sure enough"
 UNSURE = "the reference has been out of sight too long"
@@ -33,9 +35,10 @@ UNSURE = "the reference has been out of sight too long"
 class FusedGround:
     """Follows one camera over the ground by what there is, best first.
 
-    1. Reference objects and markers, of known size. The first reference, and markers and further references whose
-       places are stated, share the site frame; another reference stands wherever it is seen: it tells how high the
-       camera is and how it looks, not where.
+    1. Surveyed points, in the picture that they were read from; reference objects and markers, of known size. The
+       survey, or else the first reference, says where the site frame is; markers and references whose places are
+       stated share it; another reference stands wherever it is seen: it tells how high the camera is and how it
+       looks, not where.
     2. Telemetry with the camera's angles, where nothing else has been seen: x east, y north, the origin below the
        drone's first place. Its errors last: more readings do not make it surer. Beside a reference or a marker it adds
        what it says of height and angles, unless that cannot be.
@@ -47,12 +50,14 @@ class FusedGround:
     Args:
         references: Reference objects, the most important one first.
         markers: What watches for printed markers; None: there are none.
+        survey: Points read from one picture of this camera, which may move; None: there are none.
         camera: What is known of the camera; None: a drone's usual lens.
         params: Settings.
         remember: Whether frames know of those before them; False takes each by itself.
 
     Raises:
-        GroundError: The camera or a box does not fit the pictures (`check_size`, `update`).
+        GroundError: The survey has an area; camera, survey or a box does not fit the pictures (`check_size`,
+            `update`).
     """
 
     def __init__(
@@ -60,6 +65,7 @@ class FusedGround:
         references: Sequence[Reference] = (),
         markers: MarkerObserver | None = None,
         *,
+        survey: SurveyedGround | None = None,
         camera: CameraPrior | None = None,
         params: FusedParams | None = None,
         remember: bool = True,
@@ -70,9 +76,13 @@ class FusedGround:
         self._remember = remember
         telemetry = self._params.telemetry
         self._references = ReferenceLandmarks(references, telemetry=telemetry, remember=remember)
-        self._markers = None
+        self._markers, self._survey = markers, None if survey is None else SurveyObserver(survey)
+        self._survey_points = self._marker_points = None
+        if self._survey is not None:
+            self._survey_points = PointLandmarks.of_survey(self._survey, telemetry=telemetry)
         if markers is not None:
-            self._markers = MarkerLandmarks(markers, alone=not references, telemetry=telemetry)
+            alone = not references and survey is None
+            self._marker_points = PointLandmarks.of_markers(markers, alone=alone, telemetry=telemetry)
         self._size_px: tuple[int, int] | None = None
         self._camera: CameraPrior | None = None
         self._begin_stream(None)
@@ -81,16 +91,20 @@ class FusedGround:
         """Forget everything that the pictures have told."""
         self._size_px = self._camera = None
         self._references.reset()
-        if self._markers is not None:
-            self._markers.reset()
+        for one in (self._markers, self._survey, self._marker_points, self._survey_points):
+            if one is not None:
+                one.reset()
         self._begin_stream(None)
 
     def _begin_stream(self, camera: CameraPrior | None) -> None:
         prior = camera if camera is not None else CameraPrior.unknown(1, 1)
         self._belief = CameraBelief(prior)
         self._last_resorts = LastResorts(prior, self._params)
-        places = () if self._markers is None else self._markers.places
-        self._tally = BasisTally([one.shape for one in self._given_references], places)
+        self._tally = BasisTally(
+            [one.shape for one in self._given_references],
+            () if self._markers is None else self._markers.places,
+            0 if self._survey is None else len(self._survey.survey.points_m),
+        )
 
     @property
     def description(self) -> dict[str, Any]:
@@ -101,12 +115,20 @@ class FusedGround:
             "basis": self._tally.text(camera),
             "better": self._tally.better,
             "references": [one.describe() for one in self._given_references],
+            "survey": None if self._survey is None else self._survey.survey.description,
             "markers": [] if self._markers is None else [place.marker_id for place in self._markers.places],
             "params": asdict(self._params),
             "camera": None if camera is None else camera.origin,
             "lens_distortion_removed": True,
-            "warnings": list(self._belief.warnings.values()),
+            "warnings": [*self._survey_warnings, *self._belief.warnings.values()],
         }
+
+    @property
+    def _survey_warnings(self) -> list[str]:
+        if self._survey is None:
+            return []
+        missed = [self._survey.missed] if self._survey.missed else []
+        return [*self._survey.survey.description["warnings"], *missed]
 
     @property
     def _method(self) -> str:
@@ -127,6 +149,8 @@ class FusedGround:
             return
         for reference in self._given_references:
             reference.place.check_size(size_px)
+        if self._survey is not None:
+            self._survey.check_size(size_px)
         camera = prior_for(self._given_camera, size_px)
         self.reset()
         self._camera, self._size_px = camera, size_px
@@ -153,9 +177,12 @@ class FusedGround:
         if not self._remember:
             belief.restart()
         belief.predict(moment)
-        reasons = self._references.look(moment, belief)
-        if self._markers is not None:
-            reasons.append(self._markers.look(moment, belief))
+        reasons = []
+        if self._survey_points is not None:
+            reasons.append(self._look_at(self._survey_points, moment))
+        reasons += self._references.look(moment, belief)
+        if self._marker_points is not None:
+            reasons.append(self._look_at(self._marker_points, moment))
         if not (belief.by_landmark and moment.held and self._sure):
             reasons += self._last_resorts.ask(moment, belief)
             self._tally.most_people = self._last_resorts.most_people
@@ -163,6 +190,14 @@ class FusedGround:
         if isinstance(result, NoGroundMap):
             self._tally.why_none = result.reason
         return result
+
+    def _look_at(self, points: PointLandmarks, moment: Moment) -> str:
+        """Take in points that are seen; return why none was taken in, or ""."""
+        site_frame = self._belief.site_frame
+        reason = points.look(moment, self._belief)
+        if self._belief.site_frame != site_frame:
+            self._references.forget_places()
+        return reason
 
     def _no_map(self, reasons: Sequence[str]) -> NoGroundMap:
         told = [] if self._given_references else [HELP]

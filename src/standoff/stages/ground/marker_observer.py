@@ -15,6 +15,8 @@ from standoff.stages.ground.marker_place import MarkerPlace
 from standoff.stages.ground.markers import Markers, find_markers
 from standoff.stages.ground.observation import PointObservation
 
+NO_MARKER = "no marker has been seen"
+
 _SEARCH_EVERY_S = 1.0
 _SIDES_AROUND = 0.75
 _WIDTH_SHARE_AROUND = 0.012

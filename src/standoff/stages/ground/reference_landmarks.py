@@ -55,6 +55,11 @@ class ReferenceLandmarks:
         for solid in self._solids:
             solid.reset()
 
+    def forget_places(self) -> None:
+        """Forget where references without a stated place stand: the site frame is another one now."""
+        for solid in self._solids:
+            solid.forget_place()
+
     def keeper(self, belief: CameraBelief) -> SolidObserver | None:
         """Return the reference whose height is the belief's, if there is one."""
         return next((solid for solid in self._solids if solid.name == belief.keeper), None)
@@ -145,8 +150,7 @@ class ReferenceLandmarks:
         frame_of = STATED if solid.reference.place_known else solid.name
         known = solid.reference.height_m is not None
         if frame_of != belief.frame_of or belief.now is None:
-            for other in self._solids:
-                other.forget_place()
+            self.forget_places()
         belief.begin("reference", own, moment, frame_of=frame_of, keeper=solid.name, height_known=known, doubt=doubt)
         solid.defines_frame()
         moment.anchors_px.append(solid.note(own.state))

@@ -8,6 +8,7 @@
     camera: camera.yaml                # optional: removes lens distortion; relative to this file
     area_px: [[0, 200], [767, 200], [767, 575], [0, 575]]   # optional: where the map is to be trusted
     point_sigma_px: 1.0                # optional: how well a point was read, one coordinate
+    time_s: 0.0                        # where the camera moves: when the picture was taken, by the film's clock
 
 Pixels: the centre of the top-left pixel is (0, 0), x right, y down. Metres: x east, y north, or any other
 right-handed axes seen from above. Names are optional and only serve messages.
@@ -28,7 +29,7 @@ from standoff.stages.ground.surveyed import SurveyedGround
 from standoff.stages.ground.yaml_file import check_keys, numbers, parse_mapping, read_text
 
 _WHAT = "a survey file"
-_KEYS = ("image_size_px", "points", "camera", "area_px", "point_sigma_px")
+_KEYS = ("image_size_px", "points", "camera", "area_px", "point_sigma_px", "time_s")
 
 
 def load_survey(path: Path | str, *, camera: Camera | None = None) -> SurveyedGround:
@@ -54,6 +55,7 @@ def load_survey(path: Path | str, *, camera: Camera | None = None) -> SurveyedGr
     area_px = np.zeros((0, 2))
     if content.get("area_px") is not None:
         area_px = numbers(content["area_px"], (-1, 2), f"area_px in {path}")
+    time_s = content.get("time_s")
     sigma_px = numbers(content.get("point_sigma_px", 1.0), (), f"point_sigma_px in {path}")
     return SurveyedGround(
         [numbers(point.get("px"), (2,), f"px of {name!r} in {path}") for name, point in points.items()],
@@ -63,6 +65,7 @@ def load_survey(path: Path | str, *, camera: Camera | None = None) -> SurveyedGr
         camera=camera,
         area_px=area_px,
         point_sigma_px=float(sigma_px),
+        time_s=None if time_s is None else float(numbers(time_s, (), f"time_s in {path}")),
     )
 
 

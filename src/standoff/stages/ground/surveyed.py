@@ -40,8 +40,12 @@ class SurveyedGround:
         area_px: (V, 2) polygon as seen in the picture outside which the map is not trusted, for example where
             the ground is not flat; empty: no limit but the horizon.
         point_sigma_px: How well a point was read, one coordinate; the survey's own error belongs in it too.
+        time_s: When the picture was taken that the points were read from, where the camera does not stay as it was
+            then; None: any time.
 
     Attributes:
+        points_m: (N, 2) as given.
+        time_s: As given.
         fit: Residuals and covariance.
         description: For the record; JSON types only.
 
@@ -59,6 +63,7 @@ class SurveyedGround:
         camera: Camera | None = None,
         area_px: npt.ArrayLike = (),
         point_sigma_px: float = 1.0,
+        time_s: float | None = None,
     ) -> None:
         seen_px, surveyed_m = _pairs(points_px, points_m)
         names = tuple(names) or tuple(f"point {number}" for number in range(1, len(seen_px) + 1))
@@ -71,6 +76,7 @@ class SurveyedGround:
         _check_inside(seen_px, image_size_px, names)
         camera = None if camera is None else _fitting_camera(camera, image_size_px)
         ideal_px = _undistorted(seen_px, camera, names)
+        self.points_m, self.time_s = surveyed_m, time_s
         self.fit = fit_survey(ideal_px, surveyed_m, names, point_sigma_px)
         self._surveyed = GroundMap(
             image_to_ground=self.fit.image_to_ground,
@@ -86,19 +92,47 @@ class SurveyedGround:
         self._current_size_px = image_size_px
         self.description = _describe(self.fit, self._surveyed, names, point_sigma_px)
 
+    @property
+    def has_area(self) -> bool:
+        """Whether there is a limit to where the map is trusted."""
+        return len(self._surveyed.valid_px) > 0
+
+    @property
+    def camera(self) -> Camera | None:
+        """The lens, for pictures of the survey's size."""
+        return self._surveyed.camera
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the points."""
+        return tuple(one["name"] for one in self.description["points"])
+
+    def points_in(self, size_px: tuple[int, int]) -> tuple[FloatArray, float]:
+        """Return (N, 2) the points as seen in pictures of a size (width, height), and their standard error there.
+
+        Raises:
+            GroundError: The picture has not the survey's shape.
+        """
+        return self._in(size_px).anchors_px, self.fit.sigma_px * size_px[0] / self._surveyed.image_size_px[0]
+
     def check_size(self, size_px: tuple[int, int]) -> None:
         """Make sure that pictures of a size (width, height) have the survey's shape, before the first frame.
 
         Raises:
             GroundError: They do not.
         """
-        if isinstance(_scaled(self._surveyed, size_px), NoGroundMap):
+        self._in(size_px)
+
+    def _in(self, size_px: tuple[int, int]) -> GroundMap:
+        scaled = _scaled(self._surveyed, size_px)
+        if isinstance(scaled, NoGroundMap):
             width, height = self._surveyed.image_size_px
             raise GroundError(
                 expected=f"pictures of the survey's shape, {width}x{height}",
                 found=f"{size_px[0]}x{size_px[1]}",
                 fix="survey a frame of this source",
             )
+        return scaled
 
     def update(
         self, frame: Frame, detections: Detections, motion: CameraMotion | NoCameraMotion
