@@ -23,7 +23,7 @@ COUNTED := tests/core tests/files tests/stages tests/test_pipeline.py src/stando
 DEMO_VENV := .venv-demo
 SOURCES := $(shell find src -type f -not -path '*/__pycache__/*')
 
-.PHONY: help setup test test-live test-processors coverage fuzz lint types contracts unit demo demo-clean demo-pets docs bench lock clean
+.PHONY: help setup test test-live test-processors coverage fuzz lint types contracts unit compiled demo demo-clean demo-pets docs bench lock clean
 
 help:
 	@sed -n 's/^# make/make/p' Makefile
@@ -53,9 +53,14 @@ venv-by-apt:
 	  { echo "python3 has no venv module: install it (python3-venv) and run make again."; exit 2; }; \
 	$$sudo apt-get update -qq && $$sudo apt-get install -y -qq python3-venv && $(PYTHON) -m venv --clear $(VENV)
 
-# Types are checked while the tests run: alone, mypy leaves a core idle.
-test: lint contracts
+# Types are checked while the tests run: alone, mypy leaves a core idle. So do the checks before it.
+test: $(READY)
+	@$(MAKE) --no-print-directory --jobs=2 compiled lint contracts
 	@$(MAKE) --no-print-directory --jobs=2 types unit
+
+# Both workers would each compile all loops of a fresh clone.
+compiled: $(READY)
+	OMP_NUM_THREADS=1 PYTHONPATH=tests $(BIN)/python tests/compile_loops.py
 
 # pytest leaves with 5 where nothing is marked, and only then is that no failure.
 test-live: $(READY)

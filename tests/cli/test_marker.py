@@ -3,6 +3,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+import yaml
 from cli.calling import Call
 
 from standoff.cli.run import _ground_overrides
@@ -81,10 +82,15 @@ def test_markers_that_contradict_something_are_refused(ground: dict[str, object]
         load_settings(None, {"ground": ground})
 
 
-def test_markers_that_no_ground_stage_reads_are_refused_not_ignored() -> None:
-    marker = {"size_m": 1.0, "x_m": 4.0, "y_m": 2.0}
+@pytest.mark.parametrize("beside", ["markers", "survey"])
+def test_what_the_paper_s_method_does_not_read_is_refused_not_ignored(tmp_path: Path, beside: str) -> None:
+    survey = tmp_path / "survey.yaml"
+    points = [{"px": [x, y], "m": [x / 10, -y / 10]} for x in (10, 300) for y in (20, 200)]
+    survey.write_text(yaml.safe_dump({"image_size_px": [320, 240], "points": points}), encoding="utf-8")
+    told = {"markers": [{"size_m": 1.0, "x_m": 4.0, "y_m": 2.0}], "survey": str(survey)}
+    paper = {"square_m": 2.89, "params": {"method": "paper"}}
     with pytest.raises(ConfigError, match="does not read them"):
-        build_ground(load_settings(None, {"ground": {"markers": [marker], "survey": "survey.yaml"}}))
+        build_ground(load_settings(None, {"ground": {"reference": paper, beside: told[beside]}}))
 
 
 def test_the_command_line_s_auto_keeps_the_file_s_markers_and_none_ends_all_measuring(tmp_path: Path) -> None:

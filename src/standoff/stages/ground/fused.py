@@ -90,11 +90,14 @@ class FusedGround:
     def reset(self) -> None:
         """Forget everything that the pictures have told."""
         self._size_px = self._camera = None
+        self._forget_pictures()
+        self._begin_stream(None)
+
+    def _forget_pictures(self) -> None:
         self._references.reset()
         for one in (self._markers, self._survey, self._marker_points, self._survey_points):
             if one is not None:
                 one.reset()
-        self._begin_stream(None)
 
     def _begin_stream(self, camera: CameraPrior | None) -> None:
         prior = camera if camera is not None else CameraPrior.unknown(1, 1)
@@ -152,7 +155,7 @@ class FusedGround:
         if self._survey is not None:
             self._survey.check_size(size_px)
         camera = prior_for(self._given_camera, size_px)
-        self.reset()
+        self._forget_pictures()
         self._camera, self._size_px = camera, size_px
         self._begin_stream(camera)
 
