@@ -28,6 +28,7 @@ from standoff.stages.ground import (
     marker_pattern,
 )
 from standoff.stages.ground.solid import SolidState
+from standoff.stages.ground.solid_choice import NOT_THERE
 from standoff.stages.ground.which_box import WHICH
 
 CAMERA = lens(k1=-0.05)
@@ -249,3 +250,13 @@ def test_a_lens_that_cannot_be_is_named_and_not_used(factor: float) -> None:
         assert named == pytest.approx(1.0 / factor, rel=0.1)
         error, sigma = error_and_sigma(result, 0)
         assert error < 3.0 * sigma
+
+
+def test_a_reference_that_no_frame_shows_is_named_with_the_reason_until_one_does() -> None:
+    ground = following(references()[0])
+    bare = frame(picture(0, first=False, second=False), 0.0)
+    result = ground.update(bare, boxes(0, second=False), STILL)
+    assert isinstance(result, NoGroundMap)
+    assert ground.description["warnings"] == [f"the reference was found in no frame: {NOT_THERE}"]
+    ground.update(frame(picture(1, second=False), 1.0), boxes(1, second=False), STILL)
+    assert not ground.description["warnings"]

@@ -123,7 +123,7 @@ class FusedGround:
             "params": asdict(self._params),
             "camera": None if camera is None else camera.origin,
             "lens_distortion_removed": True,
-            "warnings": [*self._survey_warnings, *self._belief.warnings.values()],
+            "warnings": [*self._survey_warnings, *self._references.never_seen, *self._belief.warnings.values()],
         }
 
     @property

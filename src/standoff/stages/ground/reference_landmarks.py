@@ -48,12 +48,20 @@ class ReferenceLandmarks:
         ]
         self._telemetry = telemetry
         self._lens_doubts = 0
+        self._why_unseen: dict[str, str] = {}
 
     def reset(self) -> None:
         """Forget everything that the pictures have told."""
         self._lens_doubts = 0
+        self._why_unseen.clear()
         for solid in self._solids:
             solid.reset()
+
+    @property
+    def never_seen(self) -> list[str]:
+        """What was looked for in vain in every frame so far, each with the last reason."""
+        unseen = [solid for solid in self._solids if not solid.was_seen and solid.name in self._why_unseen]
+        return [f"{solid.name} was found in no frame: {self._why_unseen[solid.name]}" for solid in unseen]
 
     def forget_places(self) -> None:
         """Forget where references without a stated place stand: the site frame is another one now."""
@@ -83,7 +91,13 @@ class ReferenceLandmarks:
             reason = sort_out(lost, moment.gray, moment.detections, belief.lens)
             if reason:
                 return [reason]
-        return [reason for solid in self._solids if (reason := self._look_at(solid, moment, belief))]
+        reasons = []
+        for solid in self._solids:
+            reason = self._look_at(solid, moment, belief)
+            if reason:
+                reasons.append(reason)
+                self._why_unseen[solid.name] = reason
+        return reasons
 
     def _look_at(self, solid: SolidObserver, moment: Moment, belief: CameraBelief) -> str:
         now, time_s = belief.now, moment.frame.time_s
