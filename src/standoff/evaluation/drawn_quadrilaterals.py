@@ -39,10 +39,17 @@ class Scene:
     box_xyxy_px: FloatArray
 
 
-def draw_scene(difficulty: Difficulty, seed: int, index: int = 0) -> Scene:
-    """Draw one quadrilateral; the same class, seed and index give the same picture."""
+def draw_scene(difficulty: Difficulty, seed: int, index: int = 0, *, corners_px: FloatArray | None = None) -> Scene:
+    """Draw one quadrilateral; the same class, seed and index give the same picture.
+
+    Args:
+        difficulty: Class.
+        seed: Of everything random.
+        index: Of the picture.
+        corners_px: (4, 2) counter-clockwise as seen; None: random ones.
+    """
     rng = np.random.default_rng([DIFFICULTIES.index(difficulty), seed, index])
-    corners = _random_corners(rng)
+    corners = _random_corners(rng) if corners_px is None else corners_px
     contrast = rng.uniform(*((20.0, 45.0) if difficulty == "hard" else (55.0, 110.0)))
     ground = rng.uniform(70.0, 110.0)
     picture = ground + _texture(rng, coarse_px=12.0, amplitude=3.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import yaml
@@ -10,17 +11,21 @@ from standoff.files.json_text import plain
 from standoff.labels import LabelledData, Split
 from standoff.labels.read import CUT_GROUP
 from standoff.labels.summary import SplitSummary, summarise
+from standoff.training.run.before_after import BeforeAfter, before_after_table
 from standoff.training.run.loop import Progress
 from standoff.training.run.tables import markdown_table
 
 
-def card_text(configuration: dict[str, Any], data: LabelledData, progress: Progress) -> str:
+def card_text(
+    configuration: dict[str, Any], data: LabelledData, progress: Progress, compared: Sequence[BeforeAfter] = ()
+) -> str:
     """Return the card as Markdown.
 
     Args:
         configuration: What repeats the run.
         data: What it was trained on.
         progress: How it went.
+        compared: What the run gained and lost, set by set; empty: it began from nothing.
     """
     counts = "\n".join(_row(split, summary) for split, summary in summarise(data).splits.items())
     return f"""# Detector trained with standoff
@@ -42,7 +47,7 @@ They were chosen on this split, so that its figures are a little too good: measu
 `standoff evaluate detection`.
 
 {markdown_table(progress.rows, data.classes)}
-## What these figures do not say
+{_before_after(compared, data.classes)}## What these figures do not say
 
 How the detector does on sites, seasons, machines and cameras that the data does not show.
 
@@ -50,6 +55,15 @@ How the detector does on sites, seasons, machines and cameras that the data does
 
 ```yaml
 {yaml.safe_dump(plain(configuration), sort_keys=False)}```
+"""
+
+
+def _before_after(compared: Sequence[BeforeAfter], classes: Sequence[str]) -> str:
+    if not compared:
+        return ""
+    return f"""## Before and after, at the size of the exported network
+
+{before_after_table(compared, classes)}
 """
 
 

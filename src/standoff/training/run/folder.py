@@ -23,12 +23,16 @@ from standoff.training.darknet.export import export_darknet, read_names
 from standoff.training.darknet.network import DarknetNetwork
 from standoff.training.darknet.weights import WeightsHeader, save_weights
 from standoff.training.quantization.half_precision import store_half
+from standoff.training.run.before_after import BeforeAfter
 from standoff.training.run.figures import draw_curves, draw_predictions
 from standoff.training.run.loop import Progress
 from standoff.training.run.tables import markdown_table
 from standoff.training.run.validation import detect_pictures
 
 CHECKPOINTS: Final = "checkpoints"
+PREPARED_DATA: Final = "data"
+"""Folder in a run's folder in which a preset writes what it makes of its user's data."""
+
 _SHOWN_PICTURES: Final = 6
 
 
@@ -60,6 +64,11 @@ class RunFolder:
         return self.path / "best.weights"
 
     @property
+    def start_weights(self) -> Path:
+        """Weights before the first step."""
+        return self.path / "start.weights"
+
+    @property
     def last_weights(self) -> Path:
         """Averaged weights of the last validation."""
         return self.path / "last.weights"
@@ -83,7 +92,7 @@ class RunFolder:
             self._write_text("network.cfg", cfg_text)
             self._write_text("classes.names", "\n".join(self.classes) + "\n")
             write_json(self.path / "start.json", {"standoff": __version__, **facts})
-            save_weights(network, self.path / "start.weights")
+            save_weights(network, self.start_weights)
             # The last: where it is, the others are.
             self.write_plan(configuration)
         except OSError as error:
@@ -153,9 +162,9 @@ class RunFolder:
             if readable:
                 self._write("predictions.jpg", lambda path: draw_predictions(readable, found, self.classes, path))
 
-    def write_model(self) -> None:
-        """Export the best weights as ONNX."""
-        export_darknet(self.cfg, self.best_weights, self.path / "classes.names", None, self.path / "model.onnx")
+    def write_model(self, size_px: tuple[int, int] | None) -> None:
+        """Export the best weights as ONNX, for an input of another size (width, height) than the cfg's, if given."""
+        export_darknet(self.cfg, self.best_weights, self.path / "classes.names", size_px, self.path / "model.onnx")
 
     def write_half_model(self) -> None:
         """Store the exported model's weights in half precision.
@@ -164,6 +173,10 @@ class RunFolder:
             ModelError: That would move boxes too far.
         """
         store_half(self.path / "model.onnx", self.path / "model-half.onnx")
+
+    def write_comparison(self, compared: Sequence[BeforeAfter]) -> None:
+        """Write what the run gained and lost, set by set."""
+        write_json(self.path / "before-after.json", [one.to_dict() for one in compared])
 
     def write_card(self, text: str) -> None:
         """Write the model card."""
@@ -194,12 +207,12 @@ def read_run(folder: Path) -> dict[str, Any]:
 
 
 def refuse_used(folder: Path) -> None:
-    """Refuse a folder that holds something.
+    """Refuse a folder that holds something, unless that is the data of a preset.
 
     Raises:
         OutputError: It does.
     """
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+    if folder.exists() and (not folder.is_dir() or any(one.name != PREPARED_DATA for one in folder.iterdir())):
         raise OutputError(
             expected="a new or empty output folder",
             found=f"files in {folder}",

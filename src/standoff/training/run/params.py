@@ -24,6 +24,10 @@ class TrainParams:
         int, Ge(1), Doc("Batches of one step: their gradients are added before the weights move.")
     ] = 1
     size_px: Annotated[tuple[int, int], Doc("Width and height of the network's input.")] = (416, 416)
+    export_size_px: Annotated[
+        tuple[int, int] | None,
+        Doc("Width and height of the exported network's input, larger for small people; None: size_px."),
+    ] = None
     scales: Annotated[
         tuple[float, ...], Doc("Multi-scale: factors of the size, one drawn for each ten steps; (1,) is none.")
     ] = (1.0,)
@@ -57,6 +61,8 @@ class TrainParams:
     def __post_init__(self) -> None:
         if min(self.size_px) < 32:
             raise ValueError(f"size_px must be at least 32 each, not {self.size_px}")
+        if self.export_size_px is not None and min(self.export_size_px) < 32:
+            raise ValueError(f"export_size_px must be at least 32 each, not {self.export_size_px}")
         if not self.scales or min(self.scales) <= 0:
             raise ValueError(f"scales must be positive factors, not {self.scales}")
         if self.warmup_steps >= self.steps:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from time import monotonic
 from typing import Any, Final
@@ -20,6 +20,7 @@ from standoff.stages.detect.model_card import file_sha256
 from standoff.training.darknet.cfg import parse_cfg, read_cfg
 from standoff.training.darknet.network import DarknetNetwork
 from standoff.training.darknet.shapes import check_input
+from standoff.training.run.before_after import BeforeAfter, before_after_lines, compare_before_after
 from standoff.training.run.card import card_text
 from standoff.training.run.distributed import Crew
 from standoff.training.run.folder import RunFolder, read_run, refuse_used
@@ -177,13 +178,33 @@ def _require_usable(data: LabelledData, params: TrainParams) -> None:
 def _write_results(
     plan: RunPlan, data: LabelledData, folder: RunFolder, progress: Progress, listener: Listener
 ) -> None:
-    folder.write_card(card_text(plan.to_dict(), data, progress))
-    folder.write_model()
+    folder.write_model(plan.params.export_size_px)
+    compared = _compare(plan, data, folder)
+    if compared:
+        folder.write_comparison(compared)
+    folder.write_card(card_text(plan.to_dict(), data, progress, compared))
+    for line in before_after_lines(compared):
+        listener.on_message(line)
     try:
         folder.write_half_model()
     except ModelError as refusal:
         # The run has been paid for, and its model is there in single precision.
         listener.on_message(f"no model-half.onnx: {refusal}")
+
+
+def _compare(plan: RunPlan, data: LabelledData, folder: RunFolder) -> list[BeforeAfter]:
+    """Compare with where the run began, unless that was nothing."""
+    if plan.weights is None:
+        return []
+    params, cfg = plan.params, read_cfg(folder.cfg)
+    width_px, height_px = params.export_size_px or params.size_px
+    return compare_before_after(
+        replace(cfg, width_px=width_px, height_px=height_px),
+        (folder.start_weights, folder.best_weights),
+        data,
+        most=params.validate_pictures,
+        bf16=params.bf16,
+    )
 
 
 def _started(plan: RunPlan, data: LabelledData, folder: RunFolder, listener: Listener, *, leads: bool) -> _Start:
@@ -192,6 +213,9 @@ def _started(plan: RunPlan, data: LabelledData, folder: RunFolder, listener: Lis
     cfg_text = compose_cfg(plan.arch, data, plan.params, plan.weights)
     cfg = parse_cfg(cfg_text, "network.cfg")
     check_input(cfg)
+    if plan.params.export_size_px is not None:
+        width_px, height_px = plan.params.export_size_px
+        check_input(replace(cfg, width_px=width_px, height_px=height_px))
     network, transferred = fill_network(cfg, data.classes, plan.weights, plan.params.seed)
     facts = {
         "data": asdict(summarise(data)),

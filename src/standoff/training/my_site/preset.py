@@ -1,0 +1,15 @@
+"""The settings of the preset."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from typing import Any
+
+import yaml
+
+
+def read_preset() -> dict[str, Any]:
+    """Return arch, weights and train settings, as a plan file has them; the data are the user's."""
+    text = (files("standoff.training.my_site") / "preset.yaml").read_text(encoding="utf-8")
+    preset: dict[str, Any] = yaml.safe_load(text)
+    return preset
