@@ -116,6 +116,22 @@ def test_tracks_coast_and_say_so_while_the_detector_rests() -> None:
         assert (result.tracks.observed == result.detected).all()
 
 
+@pytest.mark.parametrize(("near_m", "calls"), [(None, 3), (-20.0, 3), (0.0, 9)])
+def test_a_pair_that_is_near_is_looked_at_in_every_frame(near_m: float | None, calls: int) -> None:
+    monitored = pipeline(frames(9), detect_every=3)
+    monitored.detect_near_m = near_m
+    results = list(monitored.run())
+    assert isinstance(monitored.detector, TwoWalkers)
+    assert np.isfinite(results[-1].proximities.gap_m).all()
+    assert monitored.detector.calls == calls
+
+
+def test_a_pair_that_is_not_measured_is_looked_at_in_every_frame() -> None:
+    monitored = pipeline(frames(9), detect_every=3, mapped=False)
+    monitored.detect_near_m = 1.0
+    assert [result.detected for result in monitored.run()] == [True] * 9
+
+
 class Weary(TwoWalkers):
     """A detector that rests on every other frame, of its own accord."""
 

@@ -8,6 +8,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from time import perf_counter
 
+import numpy as np
+
 from standoff.core.protocols import (
     CameraMotionEstimator,
     Detector,
@@ -18,9 +20,12 @@ from standoff.core.protocols import (
     RestingDetector,
     Tracker,
 )
-from standoff.core.types import Detections, Frame, FrameResult, Hazard, Outcome, Sink
+from standoff.core.types import Detections, Frame, FrameResult, Hazard, Outcome, Proximities, Sink
 
 _LOG = logging.getLogger(__name__)
+
+_AHEAD_S = 1.0
+"""A gap that closes counts as what it will be then."""
 
 
 @contextmanager
@@ -36,7 +41,8 @@ class Pipeline:
 
     Attributes:
         frames: The source.
-        detector: Runs on every `detect_every`-th frame, unless it rests there; tracks coast in between.
+        detector: Runs on every `detect_every`-th frame, unless it rests there; tracks coast in between. While a pair
+            is near, or may be, it runs on every frame (`detect_near_m`).
         motion: Reads every frame.
         ground: Reads every frame.
         sinks: By name. One that fails is logged and left out from then on; the others go on.
@@ -53,11 +59,12 @@ class Pipeline:
     hazard: HazardMonitor
     sinks: Mapping[str, Sink] = field(default_factory=dict)
     detect_every: int = 1
+    detect_near_m: float | None = None
     sink_errors: dict[str, str] = field(default_factory=dict)
 
     def run(self) -> Generator[FrameResult, None, None]:
         """Yield each frame's result after the sinks have it; close the sinks however the run ends."""
-        outcome, time_s, count = Outcome("complete"), 0.0, 0
+        outcome, time_s, count, near = Outcome("complete"), 0.0, 0, False
         try:
             frames = iter(self.frames)
             while True:
@@ -67,9 +74,9 @@ class Pipeline:
                 if frame is None:
                     break
                 time_s = frame.time_s
-                result = self.step(frame, stage_ms, detect=count % self.detect_every == 0)
+                result = self.step(frame, stage_ms, detect=near or count % self.detect_every == 0)
                 self._write(result, stage_ms)
-                count += 1
+                count, near = count + 1, self._is_near(result.proximities)
                 yield result
         except (KeyboardInterrupt, GeneratorExit):
             outcome = Outcome("interrupted", "stopped before the end of the source")
@@ -109,6 +116,14 @@ class Pipeline:
         with _clocked(stage_ms, "hazard"):
             hazards = self.hazard.update(frame.time_s, positions, proximities, ground)
         return FrameResult(frame, detections, detect, motion, ground, tracks, positions, proximities, hazards, stage_ms)
+
+    def _is_near(self, proximities: Proximities) -> bool:
+        """Return whether a gap is, or within a second will be, below `detect_near_m`, for all that is known."""
+        if self.detect_near_m is None:
+            return False
+        soon_m = proximities.gap_m - np.maximum(np.nan_to_num(proximities.closing_mps), 0.0) * _AHEAD_S
+        # A pair that is not measured may be near.
+        return not bool((soon_m >= self.detect_near_m).all())
 
     def _write(self, result: FrameResult, stage_ms: dict[str, float]) -> None:
         for name, sink in self.sinks.items():

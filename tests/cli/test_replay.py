@@ -122,7 +122,7 @@ def test_a_run_replayed_from_its_own_detections_is_the_same_run(
 def test_every_frame_is_in_the_table_and_says_whether_the_detector_ran(
     film: Path, recording: Path, tmp_path: Path
 ) -> None:
-    said = contents(monitor(film, recording, tmp_path / "run", detect_every=2))
+    said = contents(monitor(film, recording, tmp_path / "run", detect_every=2, detect_near_m=None))
     of_frame: dict[int, list[dict[str, Any]]] = {}
     for row in said["detections"]:
         of_frame.setdefault(row["frame"], []).append(row)

@@ -236,4 +236,5 @@ def build_pipeline(settings: Settings, frames: Iterable[Frame], camera: CameraPr
         proximity=build_stage("proximity", settings),
         hazard=build_stage("hazard", settings),
         detect_every=settings.detect_every,
+        detect_near_m=settings.detect_near_m,
     )

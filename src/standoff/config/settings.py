@@ -196,6 +196,14 @@ class Settings(BaseSettings):
         ),
     ] = None
     detect_every: Annotated[int, Field(ge=1, description="Detect on every k-th frame read; tracks coast between.")] = 1
+    detect_near_m: Annotated[
+        float | None,
+        Field(
+            ge=0,
+            description="With detect_every: on every frame while a pair's gap is, or within a second will be, below so "
+            "many m, or is not measured. null: never.",
+        ),
+    ] = 3.0
     detect: Annotated[DetectParams, Field(description="The detector.")] = DetectParams()
     motion: Annotated[MotionParams, Field(description="How the picture is followed.")] = MotionParams()
     ground: Annotated[GroundSettings, Field(description="The ground map.")] = GroundSettings()

@@ -367,3 +367,32 @@ def test_a_half_model_that_is_refused_does_not_end_the_run(tmp_path: Path, monke
     train_detector(plan, tmp_path / "run", heard.listener())
     assert {"model.onnx", "model-card.md"} <= {path.name for path in (tmp_path / "run").iterdir()}
     assert sum("no model-half.onnx" in message and "large ones" in message for message in heard.messages) == 1
+
+
+def test_a_run_that_goes_on_from_weights_says_what_it_gained_and_lost(
+    finished: tuple[RunPlan, Path, _Heard], tmp_path: Path
+) -> None:
+    plan, first, _ = finished
+    params = replace(plan.params, steps=3, validate_every=3, checkpoint_every=3, export_size_px=(128, 96))
+    again, heard, out = replace(plan, weights=first / "best.weights", params=params), _Heard(), tmp_path / "again"
+    train_detector(again, out, heard.listener())
+    (compared,) = json.loads((out / "before-after.json").read_text())
+    assert (compared["source"], compared["split"]) == ("blocks", "val")
+    network = DarknetNetwork(replace(read_cfg(out / "network.cfg"), width_px=128, height_px=96))
+    pictures = spread(read_data(plan.data).splits["val"], params.validate_pictures)
+    for when, weights in (("before", "start.weights"), ("after", "best.weights")):
+        load_weights(network, out / weights)
+        assert compared[when]["mean_ap11"] == validate(network, pictures, CLASSES, bf16=False).mean_ap11
+    assert "blocks (val)" in (out / "model-card.md").read_text()
+    assert any("before" in line and "after" in line for line in heard.messages)
+    assert OnnxDetector(out / "model.onnx").description["input_size_px"] == [128, 96]
+
+
+def test_a_run_from_nothing_has_no_before(finished: tuple[RunPlan, Path, _Heard]) -> None:
+    assert "Before and after" not in (finished[1] / "model-card.md").read_text()
+
+
+def test_an_export_size_that_does_not_fit_the_network_is_refused_before_the_first_step(tmp_path: Path) -> None:
+    with pytest.raises(ModelError, match="100x"):
+        train_detector(_plan(tmp_path, export_size_px=(100, 64)), tmp_path / "run", _Heard().listener())
+    assert not (tmp_path / "run").exists()
