@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -69,6 +70,18 @@ def _tell(report: QuantizationReport, *, as_json: bool, quiet: bool) -> None:
             " to ".join(_points(one.recall_before, one.recall_after)[:2]),
         )
         for one in loss.classes
+    ]
+    rows += [
+        (
+            f"ground points of {one.name}, box heights",
+            "",
+            f"{one.point_before:.3f}",
+            f"{one.point_after:.3f}",
+            f"{one.point_after - one.point_before:+.3f}",
+            "",
+        )
+        for one in loss.classes
+        if isfinite(one.point_before)
     ]
     rows += [("file, MB", "", *_parts(*sizes_mb), ""), ("median ms a picture", "", *_parts(*times_ms), "")]
     print_table(

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import math
 import shutil
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
@@ -273,6 +274,16 @@ def test_one_point_of_map_and_two_of_a_class_are_allowed_and_no_more() -> None:
     assert not few.complaints, "of 60, one truth and one step of the eleven are 10.8 points"
     assert _loss(0.11, -0.11, counted=False).complaints == ("AP of c0 falls from 90.0 to 79.0",)
     assert _loss(float("nan")).complaints
+
+
+def test_ground_points_may_be_a_tenth_worse_and_no_more() -> None:
+    def worse(before: float, after: float) -> Loss:
+        return Loss((ClassLoss("worker", 60, 0.9, 0.9, 0.3, 0.8, 0.8, True, before, after),), 0.9, 0.9)
+
+    assert not worse(0.1, 0.111).complaints and not worse(0.1, 0.05).complaints
+    assert worse(0.1, 0.113).complaints == ("worker: ground points off by 0.113 box heights, not 0.100",)
+    assert worse(0.1, 0.113).excess > 1.0 > worse(0.1, 0.111).excess
+    assert not worse(math.nan, math.nan).complaints
 
 
 @given(st.lists(st.floats(-0.1, 0.1), min_size=1, max_size=4), st.integers(0, 3), st.floats(0.001, 0.1))

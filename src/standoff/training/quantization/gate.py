@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,7 @@ from standoff.core.classes import CLASSES
 from standoff.core.errors import DataError
 from standoff.core.types import Detections, Frame
 from standoff.evaluation.detection import DetectionScore, score_detections
+from standoff.evaluation.detection.points import score_points
 from standoff.evaluation.detection.trial import LEAST_SCORE
 from standoff.labels import LabelledPicture, load_picture
 from standoff.stages.detect import DetectParams, OnnxDetector
@@ -20,6 +22,10 @@ from standoff.stages.frames import frame_from_array
 
 MOST_MEAN_LOSS = 0.01
 MOST_CLASS_LOSS = 0.02
+MOST_POINT_SHARE = 0.1
+"""The median error of ground points may grow by this share of itself."""
+_LEAST_POINT_GROWTH = 0.002
+"""In heights of the box: a tenth of nearly nothing is nothing."""
 LEAST_TRUTHS = 50
 """Of a class with fewer, one thing more or less in fifty moves AP by the 2 points that are allowed."""
 _AP11_STEP = 1.0 / 11.0
@@ -41,6 +47,8 @@ class ClassLoss:
         recall_before: Of the float model at that score.
         recall_after: Of the quantised one at the same score: a threshold once chosen stays in the settings.
         counted: False with too few truths for two points to say anything.
+        point_before: Median error of the float model's ground points, in heights of the box; NaN where it tells none.
+        point_after: Of the quantised one's.
     """
 
     name: str
@@ -51,6 +59,19 @@ class ClassLoss:
     recall_before: float
     recall_after: float
     counted: bool
+    point_before: float = math.nan
+    point_after: float = math.nan
+
+    @property
+    def allowed_points(self) -> float:
+        """Growth of the points' median error that is allowed, in heights of the box."""
+        return MOST_POINT_SHARE * self.point_before + _LEAST_POINT_GROWTH
+
+    @property
+    def point_excess(self) -> float:
+        """That growth in parts of what is allowed; 0 where nothing tells."""
+        growth = (self.point_after - self.point_before) / self.allowed_points
+        return growth if self.counted and math.isfinite(growth) else 0.0
 
     @property
     def allowed(self) -> float:
@@ -85,6 +106,11 @@ class Loss:
             for one in self.classes
             if not one.before - one.after <= one.allowed + _ROUNDING
         ]
+        found += [
+            f"{one.name}: ground points off by {one.point_after:.3f} box heights, not {one.point_before:.3f}"
+            for one in self.classes
+            if not one.point_excess <= 1.0 + _ROUNDING
+        ]
         return tuple(found)
 
     @property
@@ -92,6 +118,7 @@ class Loss:
         """The worst fall in parts of what is allowed; at most 1: good enough."""
         falls = [(self.before - self.after) / MOST_MEAN_LOSS]
         falls += [(one.before - one.after) / one.allowed for one in self.classes]
+        falls += [one.point_excess for one in self.classes]
         return max(falls)
 
 
@@ -161,6 +188,9 @@ class Gate:
             found.append(detector.detect(frame_from_array(load_picture(picture))))
             step()
         after = self._score(found)
+        points = [
+            {one.name: one.median_heights for one in score_points(score, {}).classes} for score in (self._before, after)
+        ]
         classes = tuple(
             ClassLoss(
                 name=one.name,
@@ -171,6 +201,8 @@ class Gate:
                 recall_before=one.recall,
                 recall_after=other.curve.at(one.threshold)[1],
                 counted=one.truths >= LEAST_TRUTHS,
+                point_before=points[0].get(one.name, math.nan),
+                point_after=points[1].get(one.name, math.nan),
             )
             for one, other in zip(self._before.classes, after.classes, strict=True)
             if one.truths and one.name in self._known
