@@ -175,8 +175,8 @@ def quantize_model(
 
 def _refused(report: QuantizationReport) -> QuantizationRefused:
     error = QuantizationRefused(
-        expected="mAP to fall by at most 1 point, AP of every class by at most 2 (under 50 truths: more), ground points "
-        "as good to a tenth",
+        expected="mAP to fall by at most 1 point, AP of every class by at most 2 (under 50 truths: more), and ground "
+        "points as good to a tenth",
         found=f"that {', '.join(report.best.loss.complaints)} at best ({report.best.recipe.summary})",
         fix="keep the float model; `standoff export --half` halves its file as well",
     )
