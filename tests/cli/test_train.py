@@ -187,3 +187,16 @@ def test_the_shipped_detector_is_a_start_by_its_name(call: Call, plan: Path, tmp
     code, out, _ = call("train", "--config", plan, "--out", tmp_path / "run", "--show-settings", *words)
     weights = Path(yaml.safe_load(out)["weights"])
     assert code == 0 and weights.name == "site.onnx" and weights.is_file()
+
+
+def test_a_preset_is_shown_changed_and_used_alone(call: Call, plan: Path, tmp_path: Path) -> None:
+    words = ("train", tmp_path / "blocks", "--preset", "my-site", "--out", tmp_path / "run")
+    code, out, _ = call(*words, "--set", "steps=77", "--show-settings")
+    shown = yaml.safe_load(out)
+    assert (code, shown["arch"], shown["train"]["steps"], shown["train"]["batch"]) == (0, "efficientnet-lite0", 77, 8)
+    assert shown["weights"].endswith("site.onnx")
+    code, _, err = call(*words, "--config", plan)
+    assert code == 2 and "--config and --preset" in err and err.count("\n") == 1
+    code, _, err = call(*words[:2], *words[2:], "--set", "learning_rat=1")
+    assert code == 2 and "preset my-site" in err and err.count("\n") == 1
+    assert not (tmp_path / "run").exists()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 import yaml
@@ -11,12 +11,9 @@ import yaml
 from standoff.core.errors import ConfigError
 
 if TYPE_CHECKING:
-    from standoff.training.run.train import RunPlan
+    from standoff.training.run.plan import Overrides, RunPlan
 
 Preset = Literal["my-site"]
-
-_PLAN_KEYS = ("data", "arch", "weights", "train")
-_ADVICE = "correct them; `standoff train --show-settings` lists every train setting of a plan that is right"
 
 
 def train(
@@ -48,10 +45,17 @@ def train(
             "site, in under half an hour on two cores."
         ),
     ] = None,
+    sweep: Annotated[
+        Path | None,
+        typer.Option(
+            help="YAML as of --config, and scenarios that differ from it by name: train each in its own folder, and "
+            "compare them in one table."
+        ),
+    ] = None,
     settings: Annotated[
         list[str] | None, typer.Option("--set", help="One train setting, NAME=VALUE: steps=5000, augment.mosaic=0.5.")
     ] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with the run in the folder.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with the run, or the sweep, in the folder.")] = False,
     show: Annotated[bool, typer.Option("--show-settings", help="Print the resolved settings and stop.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress bar.")] = False,
 ) -> None:
@@ -62,40 +66,71 @@ def train(
     from standoff.training.required import require_packages
 
     require_packages("torch", "onnx", purpose="train a detector")
-    from standoff.cli.console import progress_bar
+    from standoff.cli.train_sweep import train_sweep
     from standoff.training.my_site import prepare_plan
-    from standoff.training.run.distributed import Crew
-    from standoff.training.run.train import Listener, read_run, train_detector
+    from standoff.training.run.plan import Overrides
+    from standoff.training.sweep.scenarios import read_sweep
 
+    overrides = Overrides(data, arch, weights, settings or ())
+    _refuse_two({"--config": config, "--preset": preset, "--sweep": sweep})
+    if sweep is not None:
+        scenarios = read_sweep(sweep, overrides)
+        if show:
+            typer.echo(yaml.safe_dump(scenarios.to_dict(), sort_keys=False), nl=False)
+        else:
+            train_sweep(scenarios, out, resumes=resume, quiet=quiet)
+        return
     if resume:
         _refuse_changes({"--config": config, "--preset": preset, "--arch": arch, "--weights": weights})
-        given, origin = read_run(out), f"{out}/run.yaml and the command line"
-    else:
-        given, origin = _given(config, preset)
-    _override(given, {"data": data, "arch": arch, "weights": weights}, settings or [])
-    plan = _make_plan(given, origin)
+    plan = _plan(config, preset, overrides, out if resume else None)
     if show:
         typer.echo(yaml.safe_dump(plan.to_dict(), sort_keys=False), nl=False)
         return
     if preset is not None:
         plan = prepare_plan(plan, out, typer.echo)
+    _train_one(plan, out, resumes=resume, quiet=quiet)
+
+
+def _train_one(plan: RunPlan, out: Path, *, resumes: bool, quiet: bool) -> None:
+    from standoff.cli.console import progress_bar
+    from standoff.cli.train_progress import show_run
+    from standoff.training.run.distributed import Crew
+    from standoff.training.run.train import train_detector
+
     leads = Crew.join().leads
     with progress_bar(quiet=quiet or not leads, unit="steps") as bar:
-        task = bar.add_task("training", total=plan.params.steps, rate=0.0)
-
-        def on_step(step: int, loss: float, rate: float) -> None:
-            bar.update(task, completed=step, description=f"training, loss {loss:.2f}", rate=rate)
-
-        def on_row(row: dict[str, Any]) -> None:
-            line = f"step {row['step']}: loss {row['loss_total']:.2f}, mAP {100 * row['map']:.2f} %, "
-            bar.console.print(line + f"average IoU {100 * row['average_iou']:.2f} %", highlight=False)
-
-        listener = Listener(lambda line: bar.console.print(line, highlight=False, soft_wrap=True), on_step, on_row)
-        progress = train_detector(plan, out, listener, resumes=resume)
+        progress = train_detector(plan, out, show_run(bar, plan.params.steps), resumes=resumes)
     if not leads:
         return
     typer.echo(f"best mAP {100 * progress.best_map:.2f} % at step {progress.best_step}: {out}/model.onnx, best.weights")
     typer.echo(f"look at {out}/model-card.md, curves.png and predictions.jpg")
+
+
+def _plan(config: Path | None, preset: Preset | None, overrides: Overrides, resumed: Path | None) -> RunPlan:
+    """Make the plan of the file, of the preset or of the run that is resumed, and of what goes before it."""
+    from standoff.training.my_site import read_preset
+    from standoff.training.run.folder import read_run
+    from standoff.training.run.plan import make_plan, read_plan
+
+    if resumed is not None:
+        given, origin = read_run(resumed), f"{resumed}/run.yaml and the command line"
+    elif preset is not None:
+        given, origin = read_preset(), f"the preset {preset} and the command line"
+    else:
+        given = {} if config is None else read_plan(config)
+        origin = str(config) if config else "the command line"
+    overrides.apply(given)
+    return make_plan(given, origin)
+
+
+def _refuse_two(given: dict[str, object]) -> None:
+    said = [name for name, value in given.items() if value is not None]
+    if len(said) > 1:
+        raise ConfigError(
+            expected="a plan, a preset or a sweep",
+            found=" and ".join(said),
+            fix="write what the plan says into the sweep, above `scenarios`, or copy the preset (--show-settings)",
+        )
 
 
 def _refuse_changes(given: dict[str, object]) -> None:
@@ -106,85 +141,3 @@ def _refuse_changes(given: dict[str, object]) -> None:
             found=" and ".join(changed),
             fix="leave it out, or start a new run with another --out",
         )
-
-
-def _given(config: Path | None, preset: Preset | None) -> tuple[dict[str, Any], str]:
-    """Return what a file or a preset says, and where it is from, for messages."""
-    from standoff.training.my_site import read_preset
-
-    if config is not None and preset is not None:
-        raise ConfigError(
-            expected="--config or --preset", found="both", fix="copy what you need of the preset (--show-settings)"
-        )
-    if preset is not None:
-        return read_preset(), f"the preset {preset}"
-    return ({}, "the command line") if config is None else (_read_plan(config), str(config))
-
-
-def _read_plan(path: Path) -> dict[str, Any]:
-    """Read a plan; paths in it are relative to it, `$VARIABLES` and `~` are expanded."""
-    from standoff.config import read_settings_file
-    from standoff.labels.documents import resolve_path
-    from standoff.stages.detect import SHIPPED_MODELS
-
-    plan = read_settings_file(path)
-    unknown = sorted(plan.keys() - set(_PLAN_KEYS))
-    if unknown:
-        raise ConfigError(
-            expected=f"{', '.join(_PLAN_KEYS)} in {path}", found=", ".join(unknown), fix="correct the file"
-        )
-    for name in ("data", "weights"):
-        if plan.get(name) is not None:
-            shipped = name == "weights" and plan[name] in SHIPPED_MODELS
-            plan[name] = plan[name] if shipped else resolve_path(str(plan[name]), path.parent)
-    if str(plan.get("arch", "")).endswith(".cfg"):
-        plan["arch"] = str(resolve_path(plan["arch"], path.parent))
-    return plan
-
-
-def _override(given: dict[str, Any], named: dict[str, Any], settings: list[str]) -> None:
-    given.update({name: value for name, value in named.items() if value is not None})
-    for setting in settings:
-        name, equals, text = setting.partition("=")
-        if not equals:
-            raise ConfigError(
-                expected="--set NAME=VALUE", found=f"'{setting}'", fix="write for example --set steps=5000"
-            )
-        section = given
-        *outer, last = ("train", *name.split("."))
-        for one in outer:
-            section[one] = _section(section.get(one), one)
-            section = section[one]
-        try:
-            section[last] = yaml.safe_load(text)
-        except yaml.YAMLError as error:
-            raise ConfigError(
-                expected="a value as YAML has it after --set NAME=", found=f"'{setting}'", fix="check its brackets"
-            ) from error
-
-
-def _section(value: object, name: str) -> dict[str, Any]:
-    if not isinstance(value, dict | None):
-        raise ConfigError(
-            expected=f"settings by name in `{name}`", found=repr(value), fix="write `name: value` lines below it"
-        )
-    return value or {}
-
-
-def _make_plan(given: dict[str, Any], origin: str) -> RunPlan:
-    from standoff.config import read_params
-    from standoff.stages.detect import find_model
-    from standoff.training.run.params import TrainParams
-    from standoff.training.run.train import RunPlan
-
-    if given.get("data") is None:
-        raise ConfigError(
-            expected="labelled pictures", found="none", fix="name a data set, or a --config that names one"
-        )
-    weights = given.get("weights")
-    return RunPlan(
-        data=Path(given["data"]),
-        arch=str(given.get("arch") or "yolo-fastest-xl"),
-        weights=None if weights is None else find_model(str(weights)),
-        params=read_params(TrainParams, _section(given.get("train"), "train"), origin, _ADVICE),
-    )

@@ -15,7 +15,7 @@ from standoff.training.my_site import prepare_plan, read_preset
 from standoff.training.my_site.mixture import replay_folder
 from standoff.training.run.folder import PREPARED_DATA
 from standoff.training.run.params import TrainParams
-from standoff.training.run.train import RunPlan
+from standoff.training.run.plan import RunPlan
 
 _FLIGHTS = "abcdef"
 
@@ -104,7 +104,7 @@ def test_the_replayed_pictures_show_every_class_with_its_ground_points() -> None
     data = read_data(replay_folder() / "data.yaml")
     assert not data.problems
     for split in ("train", "val"):
-        every = data.splits[split]  # type: ignore[index]
+        every = data.splits[split]
         assert set(np.concatenate([one.class_id for one in every])) == {one.id for one in CLASSES}
         assert all(np.isfinite(one.foot_px).all() for one in every)
     assert sum(path.stat().st_size for path in replay_folder().rglob("*.jpg")) < 4e6

@@ -166,7 +166,7 @@ def test_labels_without_a_box_cannot_give_anchors(tmp_path: Path) -> None:
 def test_data_that_nothing_can_be_validated_with_is_refused_before_anything_is_made_of_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, emptied: str, told: str
 ) -> None:
-    monkeypatch.delattr("standoff.training.run.train.near_duplicates")
+    monkeypatch.delattr("standoff.training.run.data_checks.near_duplicates")
     plan = _plan(tmp_path)
     kind, split = emptied.split("/")
     if kind == "labels":

@@ -25,7 +25,7 @@ from standoff.stages.detect import DetectParams, OnnxDetector, find_model
 from standoff.stages.detect.class_map import map_classes
 from standoff.stages.frames.pictures import ArrayPicture
 from standoff.training.run.folder import PREPARED_DATA, refuse_used
-from standoff.training.run.train import RunPlan
+from standoff.training.run.plan import RunPlan
 
 _REPLAY_SHARE: Final = 0.3
 """Of the pictures that training draws."""

@@ -70,3 +70,8 @@ def load_checkpoint(folder: Path) -> tuple[dict[str, Any], tuple[str, ...]]:
     found = f"only damaged ones ({', '.join(damaged)})" if damaged else "none"
     fix = "delete the folder of the run, or choose another --out"
     raise DataError(expected=f"a checkpoint in {folder}", found=found, fix=fix)
+
+
+def has_checkpoint(folder: Path) -> bool:
+    """Tell whether there is anything to go on from, whole or damaged."""
+    return any(folder.glob("step-*.pt"))

@@ -8,13 +8,9 @@ from pathlib import Path
 from time import monotonic
 from typing import Any, Final
 
-from standoff.core.errors import ConfigError, DataError, ModelError
+from standoff.core.errors import ConfigError, ModelError
 from standoff.evaluation.detection import DetectionScore
-from standoff.files.json_text import plain
-from standoff.labels import LabelledData, Problem, read_data
-from standoff.labels.near_duplicates import near_duplicates
-from standoff.labels.problems import problem_lines, readable_pictures
-from standoff.labels.splits import require_splits, spread
+from standoff.labels import LabelledData, Problem
 from standoff.labels.summary import summarise
 from standoff.stages.detect.model_card import file_sha256
 from standoff.training.darknet.cfg import parse_cfg, read_cfg
@@ -22,40 +18,19 @@ from standoff.training.darknet.network import DarknetNetwork
 from standoff.training.darknet.shapes import check_input
 from standoff.training.run.before_after import BeforeAfter, before_after_lines, compare_before_after
 from standoff.training.run.card import card_text
+from standoff.training.run.data_checks import open_data, report_near_duplicates
 from standoff.training.run.distributed import Crew
 from standoff.training.run.folder import RunFolder, read_run, refuse_used
 from standoff.training.run.loop import Progress, Trainer, Watcher
 from standoff.training.run.memory import keep_freed_memory
-from standoff.training.run.params import TrainParams
+from standoff.training.run.plan import RunPlan, flat_settings
 from standoff.training.start.starting_point import backbone_of, compose_cfg, fill_network
+from standoff.training.start.transfer import Transferred
 
 _MAY_CHANGE: Final = frozenset(
     {"accumulate", "batch", "checkpoint_every", "learning_rate", "patience", "steps", "validate_every", "workers"}
 )
 """Settings that a run may go on with otherwise; the rest is in the state of its checkpoint, or would cut its curve."""
-
-
-@dataclass(frozen=True, slots=True)
-class RunPlan:
-    """What to train, from what, on what.
-
-    Attributes:
-        data: Labelled pictures; see `standoff.labels.read_data`.
-        arch: Name of an architecture, or a Darknet cfg file.
-        weights: To start from; None is from scratch.
-        params: Settings.
-    """
-
-    data: Path
-    arch: str
-    weights: Path | None
-    params: TrainParams
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return what repeats the run from any folder: plain values, as `run.yaml` holds them."""
-        weights = None if self.weights is None else str(self.weights.resolve())
-        arch = str(Path(self.arch).resolve()) if self.arch.endswith(".cfg") else self.arch
-        return {"data": str(self.data.resolve()), "arch": arch, "weights": weights, "train": plain(asdict(self.params))}
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +59,31 @@ def train_detector(plan: RunPlan, out: Path, listener: Listener, *, resumes: boo
         resumes: Go on with the run in the folder.
 
     Returns:
+        See `train_on`.
+
+    Raises:
+        DataError, ConfigError, ModelError, OutputError: See the parts.
+    """
+    leads = Crew.join().leads
+    if leads and not resumes:
+        refuse_used(out)
+    data = open_data(plan.data, [plan.params], listener.on_message if leads else None)
+    if leads and not resumes:
+        report_near_duplicates(data, listener.on_message)
+    return train_on(data, plan, out, listener, resumes=resumes)
+
+
+def train_on(data: LabelledData, plan: RunPlan, out: Path, listener: Listener, *, resumes: bool = False) -> Progress:
+    """Train a detector as `train_detector`, on data that was opened before.
+
+    Args:
+        data: That of the plan, as `open_data` gives it.
+        plan: See `train_detector`.
+        out: Folder of the run: absent or empty, unless the run is resumed.
+        listener: Hears of it.
+        resumes: Go on with the run in the folder.
+
+    Returns:
         How it went; the best weights and their ONNX file are in the folder.
 
     Raises:
@@ -91,12 +91,6 @@ def train_detector(plan: RunPlan, out: Path, listener: Listener, *, resumes: boo
     """
     keep_freed_memory()
     leads = Crew.join().leads
-    if leads and not resumes:
-        refuse_used(out)
-    data = read_data(plan.data)
-    if leads:
-        _report_problems(data, plan.params, listener)
-    _require_usable(data, plan.params)
     folder = RunFolder(out, data.classes)
     start = _resumed(folder, plan) if resumes else _started(plan, data, folder, listener, leads=leads)
     backbone_layers = plan.params.backbone_layers or start.backbone_layers
@@ -122,6 +116,22 @@ def train_detector(plan: RunPlan, out: Path, listener: Listener, *, resumes: boo
     if leads:
         _write_results(plan, data, folder, progress, listener)
     return progress
+
+
+def compose_start(plan: RunPlan, data: LabelledData) -> tuple[str, DarknetNetwork, Transferred]:
+    """Return what a run starts from: the text of its cfg, the filled network, and where its layers came from.
+
+    Raises:
+        ConfigError, DataError, ModelError: Architecture, size of the input or weights do not fit.
+    """
+    cfg_text = compose_cfg(plan.arch, data, plan.params, plan.weights)
+    cfg = parse_cfg(cfg_text, "network.cfg")
+    check_input(cfg)
+    if plan.params.export_size_px is not None:
+        width_px, height_px = plan.params.export_size_px
+        check_input(replace(cfg, width_px=width_px, height_px=height_px))
+    network, transferred = fill_network(cfg, data.classes, plan.weights, plan.params.seed)
+    return cfg_text, network, transferred
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -154,25 +164,6 @@ class _Unreadable:
     def sum_up(self) -> None:
         if self._paths:
             self._listener.on_message(f"{len(self._paths)} pictures were skipped; others were shown in their place")
-
-
-def _require_usable(data: LabelledData, params: TrainParams) -> None:
-    require_splits(data, ("train", "val"))
-    shown = spread(data.splits["val"], params.validate_pictures)
-    if all(picture.ignored.all() for picture in shown):
-        raise DataError(
-            expected="boxes to validate with",
-            found=f"none in the {len(shown)} pictures of the validation split that are used",
-            fix="label them, hold out other scenes, or raise validate_pictures",
-        )
-    sources = sorted({picture.source for pictures in data.splits.values() for picture in pictures})
-    unknown = sorted(set(params.augment.any_rotation_sources) - set(sources))
-    if unknown:
-        raise ConfigError(
-            expected=f"names of data sets ({', '.join(sources)}) in any_rotation_sources",
-            found=", ".join(unknown),
-            fix="correct the setting",
-        )
 
 
 def _write_results(
@@ -208,15 +199,7 @@ def _compare(plan: RunPlan, data: LabelledData, folder: RunFolder) -> list[Befor
 
 
 def _started(plan: RunPlan, data: LabelledData, folder: RunFolder, listener: Listener, *, leads: bool) -> _Start:
-    if leads:
-        _report_near_duplicates(data, listener)
-    cfg_text = compose_cfg(plan.arch, data, plan.params, plan.weights)
-    cfg = parse_cfg(cfg_text, "network.cfg")
-    check_input(cfg)
-    if plan.params.export_size_px is not None:
-        width_px, height_px = plan.params.export_size_px
-        check_input(replace(cfg, width_px=width_px, height_px=height_px))
-    network, transferred = fill_network(cfg, data.classes, plan.weights, plan.params.seed)
+    cfg_text, network, transferred = compose_start(plan, data)
     facts = {
         "data": asdict(summarise(data)),
         "weights_sha256": None if plan.weights is None else file_sha256(plan.weights),
@@ -243,7 +226,7 @@ def _resumed(folder: RunFolder, plan: RunPlan) -> _Start:
             found=f"{', '.join(folder.classes)} in the data",
             fix="give the same data, or start a new run",
         )
-    before, now = (_flat(one["train"]) for one in (read_run(folder.path), plan.to_dict()))
+    before, now = (flat_settings(one["train"]) for one in (read_run(folder.path), plan.to_dict()))
     for name in sorted(now.keys() & before.keys() - _MAY_CHANGE):
         if now[name] != before[name]:
             raise ConfigError(
@@ -254,29 +237,4 @@ def _resumed(folder: RunFolder, plan: RunPlan) -> _Start:
     return _Start(DarknetNetwork(cfg), int(facts["backbone_layers"]), bool(facts["transferred"].get("folded")))
 
 
-def _flat(settings: dict[str, Any], before: str = "") -> dict[str, Any]:
-    """Return settings by dotted name."""
-    flat: dict[str, Any] = {}
-    for name, value in settings.items():
-        flat |= _flat(value, f"{before}{name}.") if isinstance(value, dict) else {f"{before}{name}": value}
-    return flat
-
-
-def _report_problems(data: LabelledData, params: TrainParams, listener: Listener) -> None:
-    _, unreadable = readable_pictures(spread(data.splits["val"], params.validate_pictures), lambda: None)
-    for line in problem_lines([*data.problems, *unreadable]):
-        listener.on_message(line)
-
-
-def _report_near_duplicates(data: LabelledData, listener: Listener) -> None:
-    """Warn of held-out pictures that look like training ones: their figures would say nothing about new sites."""
-    found = near_duplicates(data)
-    if found:
-        first = found[0]
-        listener.on_message(
-            f"{len(found)} held-out pictures look like one to train on, first {first.held_out.name} ({first.split}) "
-            f"like {first.train.name}: split by scene, flight or video, or figures will be too good"
-        )
-
-
-__all__ = ["Listener", "RunPlan", "read_run", "train_detector"]
+__all__ = ["Listener", "RunPlan", "compose_start", "read_run", "train_detector", "train_on"]
