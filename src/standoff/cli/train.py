@@ -61,10 +61,10 @@ def train(
         _refuse_changes({"--config": config, "--arch": arch, "--weights": weights})
         given, origin = read_run(out), f"{out}/run.yaml and the command line"
     else:
-        given = {} if config is None else _read_plan(config)
+        given = {} if config is None else read_plan(config)
         origin = str(config) if config else "the command line"
     _override(given, {"data": data, "arch": arch, "weights": weights}, settings or [])
-    plan = _make_plan(given, origin)
+    plan = make_plan(given, origin)
     if show:
         typer.echo(yaml.safe_dump(plan.to_dict(), sort_keys=False), nl=False)
         return
@@ -97,8 +97,12 @@ def _refuse_changes(given: dict[str, object]) -> None:
         )
 
 
-def _read_plan(path: Path) -> dict[str, Any]:
-    """Read a plan; paths in it are relative to it, `$VARIABLES` and `~` are expanded."""
+def read_plan(path: Path) -> dict[str, Any]:
+    """Read a plan; paths in it are relative to it, `$VARIABLES` and `~` are expanded.
+
+    Raises:
+        ConfigError: The file cannot be read, or holds something else.
+    """
     from standoff.config import read_settings_file
     from standoff.labels.documents import resolve_path
     from standoff.stages.detect import SHIPPED_MODELS
@@ -147,7 +151,17 @@ def _section(value: object, name: str) -> dict[str, Any]:
     return value or {}
 
 
-def _make_plan(given: dict[str, Any], origin: str) -> RunPlan:
+def make_plan(given: dict[str, Any], origin: str) -> RunPlan:
+    """Check a plan's settings.
+
+    Args:
+        given: What `read_plan` read.
+        origin: Where it comes from, for messages.
+
+    Raises:
+        ConfigError: No data, a setting that does not exist, or a value out of bounds.
+        ModelError: No such weights.
+    """
     from standoff.config import read_params
     from standoff.stages.detect import find_model
     from standoff.training.run.params import TrainParams
