@@ -10,27 +10,62 @@ import typer
 from standoff.core.errors import ConfigError
 
 if TYPE_CHECKING:
+    from standoff.config import Settings
     from standoff.evaluation.timing import Spread
+
+_FRAMES = 200
 
 
 def bench(
-    source: Annotated[Path, typer.Argument(help="Video file, or a folder of pictures.", show_default=False)],
+    source: Annotated[
+        Path | None,
+        typer.Argument(
+            help="Video file, or a folder of pictures. Without one, --providers takes the film of the demo."
+        ),
+    ] = None,
     config: Annotated[Path | None, typer.Option(help="Settings, YAML.")] = None,
     model: Annotated[str | None, typer.Option(help="Detector: site (ours, the default), or an ONNX file.")] = None,
-    frames: Annotated[int, typer.Option(min=2, help="At most so many frames of the source.")] = 200,
+    frames: Annotated[
+        int | None, typer.Option(min=2, help="At most so many frames of the source: 200, or 8 with --providers.")
+    ] = None,
     darknet: Annotated[
         str | None, typer.Option(help="CFG,WEIGHTS of the same network: times OpenCV on it beside ONNX Runtime.")
+    ] = None,
+    providers: Annotated[
+        bool, typer.Option("--providers", help="Instead, compare the detector by each provider there is with the CPU.")
+    ] = False,
+    training: Annotated[
+        Path | None, typer.Option(help="Instead, or besides, compare a training step of this plan on CPU and CUDA.")
     ] = None,
     json_file: Annotated[
         Path | None, typer.Option("--json", help="Also write the result as JSON; - prints it.")
     ] = None,
 ) -> None:
-    """Time every stage on a source, and the monitor's own work at 1080p with ten tracks."""
-    from standoff.cli.console import print_table, write_json
+    """Time every stage on a source, and the monitor's own work at 1080p with ten tracks.
+
+    With --providers or --training: do other backends say what the CPU says, and how fast? Leaves with 1 where one
+    differs by more than a thousandth.
+    """
     from standoff.config import load_settings
-    from standoff.evaluation.bench import OWN_WORK_LIMIT_MS, bench_source
 
     settings = load_settings(config, {"model": model} if model else {})
+    if providers or training is not None:
+        from standoff.cli.backends import FRAMES, compare_backends
+
+        count = frames or FRAMES
+        compare_backends(source, settings, providers=providers, training=training, frames=count, json=json_file)
+        return
+    if source is None:
+        raise ConfigError(
+            expected="a video file or a folder of pictures", found="none", fix="name one, or give --providers"
+        )
+    _time_stages(source, settings, frames or _FRAMES, darknet, json_file)
+
+
+def _time_stages(source: Path, settings: Settings, frames: int, darknet: str | None, json_file: Path | None) -> None:
+    from standoff.cli.console import print_table, write_json
+    from standoff.evaluation.bench import OWN_WORK_LIMIT_MS, bench_source
+
     report = bench_source(source, settings, frames=frames, darknet=_two_files(darknet))
     if json_file is not None:
         write_json(report.to_dict(), json_file)

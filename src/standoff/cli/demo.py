@@ -68,6 +68,15 @@ def _load_film() -> Clip:
     from standoff.evaluation.paper import load_clip
 
     try:
-        return load_clip(Path(str(files("standoff"))) / "demo")
+        return load_clip(_folder())
     except DataError as error:
         raise DataError(expected=error.expected, found=error.found, fix="install standoff again") from error
+
+
+def find_film() -> Path:
+    """Return the video that comes with standoff."""
+    return _folder() / "video.mp4"
+
+
+def _folder() -> Path:
+    return Path(str(files("standoff"))) / "demo"

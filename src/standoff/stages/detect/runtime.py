@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Final
 
@@ -28,6 +30,7 @@ _AUTO: Final = ("cuda", "cpu")
 """OpenVINO must be asked for: on some processors it computes in bfloat16 without saying so."""
 _ERRORS_ONLY: Final = 3
 ONNX_ERRORS: Final = (
+    runtime_errors.EPFail,
     runtime_errors.Fail,
     runtime_errors.InvalidArgument,
     runtime_errors.InvalidGraph,
@@ -81,6 +84,10 @@ def open_session(path: Path, provider: Provider, intra_op_threads: int) -> onnxr
     options.intra_op_num_threads = intra_op_threads
     options.log_severity_level = _ERRORS_ONLY
     names = [_PROVIDERS[name][0] for name in _CHAINS[chosen]]
+    if "cuda" in _CHAINS[chosen]:
+        # CUDA's libraries from pip lie where the loader does not look; without any, it prints what is missing.
+        with redirect_stdout(sys.stderr):
+            onnxruntime.preload_dlls()
     try:
         session = onnxruntime.InferenceSession(str(path), options, providers=names)
     except ONNX_ERRORS as error:
