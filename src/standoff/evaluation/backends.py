@@ -24,7 +24,7 @@ from standoff.stages.detect.letterbox import Letterbox
 from standoff.stages.detect.network import Network
 from standoff.stages.detect.outputs import Candidates
 from standoff.stages.detect.params import DetectParams, Provider
-from standoff.stages.detect.runtime import ONNX_ERRORS
+from standoff.stages.detect.runtime import ONNX_ERRORS, available_providers
 from standoff.stages.frames import open_source
 
 TOLERANCE: Final = 1e-3
@@ -65,7 +65,8 @@ class ProviderTrial:
         provider: As `DetectParams.provider` calls it.
         agreement: With the CPU; None where it did not compute.
         picture_ms: Times of a picture that is scaled already, from its levels to rows of boxes; likewise.
-        absent: Why it is not there; empty where it is.
+        absent: Why it is not there, or does not start; empty where it computes.
+        is_installed: ONNX Runtime offers it, whether it starts or not.
         failure: Why it could not answer although it is there; empty where it could.
     """
 
@@ -74,17 +75,18 @@ class ProviderTrial:
     picture_ms: Spread | None = None
     absent: str = ""
     failure: str = ""
+    is_installed: bool = True
 
     @property
     def is_good(self) -> bool:
-        """Whether it is absent, or agrees with the CPU."""
+        """Whether it does not compute here at all, or agrees with the CPU."""
         return bool(self.absent) or (self.agreement is not None and self.agreement.is_close)
 
     @property
     def verdict(self) -> str:
         """What to tell people, in a word or two."""
         if self.absent:
-            return "absent"
+            return "no start" if self.is_installed else "absent"
         if self.failure:
             return "FAILS"
         return "OK" if self.is_good else "DIFFERS"
@@ -163,7 +165,8 @@ def compare_providers(
             times = Spread.of(_times_ms(network, pictures * repeats, letterbox))
             yield ProviderTrial(provider, found, times)
         except MissingDependency as error:
-            yield ProviderTrial(provider, absent=f"found {error.found}; {error.fix}")
+            is_installed = provider in available_providers()
+            yield ProviderTrial(provider, absent=f"found {error.found}; {error.fix}", is_installed=is_installed)
         except (StandoffError, *ONNX_ERRORS) as error:
             yield ProviderTrial(provider, failure=" ".join(str(error).split())[:200])
 

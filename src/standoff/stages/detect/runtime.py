@@ -84,12 +84,13 @@ def open_session(path: Path, provider: Provider, intra_op_threads: int) -> onnxr
     options.intra_op_num_threads = intra_op_threads
     options.log_severity_level = _ERRORS_ONLY
     names = [_PROVIDERS[name][0] for name in _CHAINS[chosen]]
-    if "cuda" in _CHAINS[chosen]:
-        # CUDA's libraries from pip lie where the loader does not look; without any, it prints what is missing.
-        with redirect_stdout(sys.stderr):
-            onnxruntime.preload_dlls()
     try:
-        session = onnxruntime.InferenceSession(str(path), options, providers=names)
+        # Both print what is missing, to where a verb's JSON goes.
+        with redirect_stdout(sys.stderr):
+            if "cuda" in _CHAINS[chosen]:
+                # CUDA's libraries from pip lie where the loader does not look.
+                onnxruntime.preload_dlls()
+            session = onnxruntime.InferenceSession(str(path), options, providers=names)
     except ONNX_ERRORS as error:
         raise ModelError(
             expected=f"an ONNX model at {path}",
