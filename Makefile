@@ -53,10 +53,10 @@ venv-by-apt:
 	  { echo "python3 has no venv module: install it (python3-venv) and run make again."; exit 2; }; \
 	$$sudo apt-get update -qq && $$sudo apt-get install -y -qq python3-venv && $(PYTHON) -m venv --clear $(VENV)
 
-# Types are checked while the tests run: alone, mypy leaves a core idle. So do the checks before it.
+# Side by side what needs one core only: first of all what takes longest.
 test: $(READY)
-	@$(MAKE) --no-print-directory --jobs=2 compiled lint contracts
-	@$(MAKE) --no-print-directory --jobs=2 types unit
+	@$(MAKE) --no-print-directory --jobs=2 types compiled contracts lint
+	@$(MAKE) --no-print-directory unit
 
 # Both workers would each compile all loops of a fresh clone.
 compiled: $(READY)

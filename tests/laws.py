@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import pytest
@@ -38,6 +39,18 @@ def examples(count: int) -> settings:
     return settings(max_examples=count * settings().max_examples // EXAMPLES)
 
 
+def few(values: Iterable[Any], *, quick: int = 1) -> list[Any]:
+    """Return the parameters of what is dear to try: the first ones each time, all in `make test-live`."""
+    return [
+        value if index < quick else pytest.param(*_arguments(value), marks=pytest.mark.live)
+        for index, value in enumerate(values)
+    ]
+
+
+def _arguments(value: object) -> tuple[Any, ...]:
+    return value if isinstance(value, tuple) else (value,)
+
+
 def seeds(count: int, *, quick: int = 2) -> list[Any]:
-    """Return the parameters of a law that is tried with several seeds: a few each time, all in `make test-live`."""
-    return [seed if seed < quick else pytest.param(seed, marks=pytest.mark.live) for seed in range(count)]
+    """Return the parameters of a law that is tried with several seeds, as `few`."""
+    return few(range(count), quick=quick)

@@ -357,7 +357,8 @@ def test_a_run_never_replaces_its_own_source(call: Call, video: Path, site: Path
     assert source.stat().st_size > 0
 
 
-@pytest.mark.parametrize("ending", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.live)])
+@pytest.mark.live
+@pytest.mark.parametrize("ending", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_run_leaves_whole_files_that_say_so(
     video: Path, site: Path, tmp_path: Path, ending: signal.Signals
 ) -> None:

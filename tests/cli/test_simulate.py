@@ -6,6 +6,7 @@ from pathlib import Path
 import moderngl
 import pytest
 from cli.calling import Call
+from laws import few
 
 from standoff import simulation
 from standoff.simulation.presets import MAX_SEED, PRESETS
@@ -98,6 +99,7 @@ def test_a_clip_appears_silently_and_is_replaced_only_when_asked(opengl: None, c
     assert (tmp_path / "clip" / "truth.parquet").read_bytes() != before
 
 
+@pytest.mark.live
 def test_the_truth_alone_needs_no_opengl_and_says_what_it_is(
     call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -109,7 +111,7 @@ def test_the_truth_alone_needs_no_opengl_and_says_what_it_is(
     assert not (tmp_path / "clip" / "video.mp4").exists()
 
 
-@pytest.mark.parametrize("layout", ["yolo", "coco"])
+@pytest.mark.parametrize("layout", few(["yolo", "coco"]))
 def test_a_data_set_appears(opengl: None, call: Call, tmp_path: Path, layout: str) -> None:
     code, out, err = call(*_SET, "--layout", layout, "--out", tmp_path / "set")
     assert code == 0 and out.startswith("1 picture") and err == ""

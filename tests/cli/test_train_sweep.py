@@ -36,6 +36,7 @@ def sweep(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.live
 def test_a_sweep_ends_with_a_table_and_each_scenario_is_a_run_that_can_be_repeated(
     call: Call, sweep: Path, tmp_path: Path
 ) -> None:

@@ -138,7 +138,8 @@ def test_the_machine_is_named() -> None:
     assert {"python", "numpy", "av", "onnxruntime"} <= named["versions"].keys()
 
 
-@pytest.mark.parametrize("kind", ["video", pytest.param("folder", marks=pytest.mark.live)])
+@pytest.mark.live
+@pytest.mark.parametrize("kind", ["video", "folder"])
 def test_a_source_is_timed_with_all_its_outputs_and_nothing_is_left_behind(
     tmp_path: Path, kind: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -58,6 +58,7 @@ def test_what_no_method_found_is_null_in_the_record() -> None:
     assert (row["failed_percent"], row["corner_rmse_px"]) == (100.0, None)
 
 
+@pytest.mark.live
 def test_corners_do_not_depend_on_the_run(result: RectificationResult) -> None:
     again = evaluate_rectification(scenes=16, seed=7, methods=("oriented",))
     for one in again.scores:

@@ -80,6 +80,7 @@ def test_degrees_are_those_of_the_metres(open_air: list[tuple[Scene, list[Row]]]
         assert (row["latitude_deg"], row["longitude_deg"]) == pytest.approx(degrees, rel=GEOMETRY_REL)
 
 
+@pytest.mark.live
 def test_each_device_drifts_slowly_by_half_a_metre_to_three(open_air: list[tuple[Scene, list[Row]]]) -> None:
     rms_m = []
     for scene, rows in open_air:
@@ -108,6 +109,7 @@ def test_reports_come_a_second_apart_but_for_outages(open_air: list[tuple[Scene,
     assert outages == pytest.approx(expected, abs=5 * expected**0.5)
 
 
+@pytest.mark.live
 def test_near_a_structure_reports_are_worse_and_fewer_and_a_low_shed_is_none() -> None:
     tall, low = _scene(_CABIN), _scene(_SHED)
     by_cabin, by_shed = _reports(tall, 1), _reports(low, 1)

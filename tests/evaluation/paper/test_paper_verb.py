@@ -94,6 +94,7 @@ def test_every_figure_of_the_mobile_test_stands_beside_the_papers(measured: dict
     assert made["of"] == drawn_clip.FRAMES
 
 
+@pytest.mark.live
 def test_box_errors_make_ale(clip_folder: Path) -> None:
     words = (clip_folder, "--method", "oriented", "--detector", "noisy", "--box-error", "3")
     one, other = (first_clip(*words, "--seed", seed) for seed in (0, 6))

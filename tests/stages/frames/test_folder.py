@@ -72,6 +72,7 @@ def test_orientation_in_exif_data_is_followed_as_opencv_follows_it(tmp_path: Pat
     assert np.abs(frame.image.astype(int) - expected).mean() <= RESIZED_LEVELS
 
 
+@pytest.mark.live
 def test_photographs_of_a_drone_read_as_opencv_reads_them(shared_data: Path, tmp_path: Path) -> None:
     path = sorted((shared_data / "drone_photos").glob("*.JPG"))[0]
     (tmp_path / path.name).symlink_to(path)

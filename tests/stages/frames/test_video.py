@@ -60,6 +60,7 @@ def test_times_are_the_presentation_timestamps_from_the_first_frame_on(videos: d
     assert [frame.time_s for frame in read(videos[name])] == pytest.approx([t / 1000 for t in times_ms], abs=1e-9)
 
 
+@pytest.mark.live
 @given(
     start_s=st.floats(0, 2.1), length_s=st.floats(0.11, 7), every=st.integers(1, 7), name=st.sampled_from([*RECIPES])
 )
@@ -149,6 +150,7 @@ def test_frames_stay_valid_after_the_source_is_closed(videos: dict[str, Path]) -
     assert [index_in(frame.picture.resized_bgr(96, 64)) for frame in frames] == list(range(60))
 
 
+@pytest.mark.live
 def test_the_surveyed_public_video_reads_as_opencv_reads_it(shared_data: Path) -> None:
     path = shared_data / "pets2009" / "vtest.avi"
     capture = cv2.VideoCapture(str(path))

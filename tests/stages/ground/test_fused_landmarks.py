@@ -150,6 +150,7 @@ def test_one_box_that_could_be_either_of_two_is_no_map() -> None:
     assert isinstance(result, NoGroundMap) and WHICH in result.reason
 
 
+@pytest.mark.live
 def test_two_references_are_told_apart_whichever_the_detector_is_surer_of() -> None:
     for turned_round in (False, True):
         ground, detections = following(*references()), boxes(0)

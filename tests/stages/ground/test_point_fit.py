@@ -59,6 +59,7 @@ def test_a_fit_with_a_certain_lens_is_opencvs_pose_of_noisy_corners() -> None:
         np.testing.assert_allclose(found.position_m, position_m, atol=tolerances.PEER_POSE_M)
 
 
+@pytest.mark.live
 def test_the_stated_error_is_that_of_many_trials() -> None:
     rng = np.random.default_rng(1)
     prior = CameraPrior(CAMERA, 1e-6, 1e-6, "camera file")

@@ -3,6 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from drawn_solid import distance_and_sigma, lens, looking_at
+from laws import few
 from tolerances import DERIVATIVE_REL, GEOMETRY_REL, GROUND_THROUGH_LENS_M, MAP_SIGMA_REL
 
 from standoff.core.homography import FloatArray
@@ -38,7 +39,7 @@ def _distance(view: View) -> float:
     return float(np.linalg.norm(other - one))
 
 
-@pytest.mark.parametrize("k", [None, 6, 7], ids=["all", "focal length", "k1"])
+@pytest.mark.parametrize("k", few([None, 6, 7]), ids=["all", "focal length", "k1"])
 def test_the_sigma_of_a_distance_is_the_scatter_of_disturbed_views(k: int | None) -> None:
     sigma = SIGMA if k is None else np.where(np.arange(8) == k, SIGMA, 0.0)
     rng = np.random.default_rng(0)

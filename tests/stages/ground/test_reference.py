@@ -124,6 +124,7 @@ def test_the_distortion_of_a_wide_lens_is_removed() -> None:
     assert off.max() < 0.3
 
 
+@pytest.mark.live
 def test_stated_errors_of_the_map_are_of_the_size_of_the_real_ones() -> None:
     squares = []
     for yaw_deg in np.arange(0.0, 360.0, 24.0):
@@ -147,6 +148,7 @@ def flight(count: int, yaw_step_deg: float) -> list[tuple[ImageArray, FloatArray
     return frames
 
 
+@pytest.mark.live
 def test_the_site_frame_stays_while_the_drone_turns_around_and_only_the_first_box_is_given() -> None:
     frames = flight(25, 5.0)
     stage = ReferenceGround(

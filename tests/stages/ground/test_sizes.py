@@ -69,6 +69,7 @@ def test_people_of_the_usual_size_give_the_camera_its_height(seed: int) -> None:
     assert abs(np.median(error)) < CLEAN_CROWD_LOG
 
 
+@pytest.mark.live
 def test_what_the_sizes_claim_to_know_they_know() -> None:
     inside, off = [], []
     for seed in range(40):

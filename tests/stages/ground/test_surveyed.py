@@ -137,7 +137,8 @@ def distance_and_sigma(current: GroundMap, pair_px: FloatArray) -> tuple[float, 
     return distance_m, float(np.sqrt(slope @ current.covariance[:9, :9] @ slope))
 
 
-@pytest.mark.parametrize("count", [4, pytest.param(8, marks=pytest.mark.live)])
+@pytest.mark.live
+@pytest.mark.parametrize("count", [4, 8])
 def test_the_stated_click_accuracy_carries_to_the_distances(count: int) -> None:
     rng, sigma_px, points_m = np.random.default_rng(count), 0.5, _POINTS_M[:count]
     exact_px, pair_px = seen(points_m, _PLAIN_LENS), seen(_PAIR_M, _PLAIN_LENS)
@@ -148,6 +149,7 @@ def test_the_stated_click_accuracy_carries_to_the_distances(count: int) -> None:
     assert sigma_m == pytest.approx(np.std(distances), rel=SURVEY_SIGMA_REL)
 
 
+@pytest.mark.live
 def test_worse_clicks_than_stated_are_seen_from_the_scatter() -> None:
     rng, sigma_px = np.random.default_rng(7), 3.0
     exact_px, pair_px = seen(_POINTS_M, _PLAIN_LENS), seen(_PAIR_M, _PLAIN_LENS)

@@ -11,6 +11,7 @@ import onnxruntime
 import pytest
 import tolerances
 import torch
+from laws import few
 from training.conftest import DarknetFiles
 
 from standoff.core.errors import MissingDependency, ModelError, OutputError
@@ -106,7 +107,7 @@ def test_onnx_runtime_computes_what_torch_computes(
     np.testing.assert_allclose(by_onnx, by_torch, rtol=tolerances.ONNX_LOGIT, atol=tolerances.ONNX_SIGMOID)
 
 
-@pytest.mark.parametrize("name", sorted(set(ARCHITECTURES) - {"yolov3"}))
+@pytest.mark.parametrize("name", few(sorted(set(ARCHITECTURES) - {"yolov3"}), quick=2))
 def test_onnx_runtime_computes_what_torch_computes_in_every_small_architecture(
     make_darknet_files: MakeFiles, tmp_path: Path, name: str
 ) -> None:

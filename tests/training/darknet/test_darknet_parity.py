@@ -11,6 +11,7 @@ import numpy.typing as npt
 import onnxruntime
 import pytest
 import tolerances
+from laws import few
 from training.conftest import DarknetFiles
 
 from standoff.training import export_darknet, yolov3_cfg, yolov3_tiny_cfg
@@ -70,7 +71,7 @@ def test_yolo_fastest_with_its_real_weights_decodes_as_in_opencv(
     assert worst.max() <= tolerances.DARKNET_DECODED
 
 
-@pytest.mark.parametrize(("size_px", "seed"), [((160, 160), 0), ((224, 160), 1), ((160, 224), 2)])
+@pytest.mark.parametrize(("size_px", "seed"), few([((224, 160), 1), ((160, 160), 0), ((160, 224), 2)]))
 def test_yolov3_tiny_decodes_as_in_opencv(
     make_darknet_files: Callable[[str, int], DarknetFiles], tmp_path: Path, size_px: tuple[int, int], seed: int
 ) -> None:

@@ -46,6 +46,7 @@ def plan(data: Path) -> RunPlan:
     return RunPlan(data, "efficientnet-lite0", None, TrainParams(steps=40, warmup_steps=1, validate_every=10))
 
 
+@pytest.mark.live
 def test_what_the_detector_sees_of_classes_that_nobody_labelled_counts_neither_way(tmp_path: Path) -> None:
     said: list[str] = []
     given = plan(labelled(tmp_path / "labelled", tuple(f"{flight}_0" for flight in _FLIGHTS), ("person",)))

@@ -33,6 +33,7 @@ Sixteen are counted, because the heap may still grow for a few when something sm
 """
 
 
+@pytest.mark.live
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="mallopt is glibc's")
 def test_large_blocks_are_not_fetched_from_the_system_again_and_again() -> None:
     done = subprocess.run([sys.executable, "-c", _PROGRAM], check=True, capture_output=True, text=True)

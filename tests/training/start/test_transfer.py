@@ -82,6 +82,7 @@ def test_weights_that_are_cut_after_a_layer_fill_what_is_before_it(tmp_path: Pat
         assert all(torch.equal(value, expected[name]) for name, value in _state(target, layer).items())
 
 
+@pytest.mark.live
 def test_a_darknet53_cut_as_everybody_publishes_it_is_the_first_52_convolutions(tmp_path: Path) -> None:
     save_weights(_network(yolov3_cfg(80, 32, 32)), tmp_path / "darknet53.conv.74", cut_after_layer=74)
     # Of the published file: 162482580 bytes.
