@@ -35,8 +35,8 @@ from standoff.files.json_text import plain
 from standoff.files.whole import whole_file
 from standoff.labels import LabelledData, read_data
 from standoff.labels.documents import read_yaml, resolve_path
-from standoff.labels.layout import YAML_SUFFIXES
-from standoff.labels.mixture import read_mixture
+from standoff.labels.mixture import is_mixture, read_mixture
+from standoff.labels.regions import OWN_REGIONS
 from standoff.labels.splits import require_splits
 from standoff.stages.detect import SHIPPED_MODELS
 from standoff.stages.detect.model_card import file_sha256
@@ -51,7 +51,6 @@ RECIPE = (
 )  # fmt: skip
 BESIDE_WEIGHTS = ("network.cfg", "classes.names")
 """In the folder of a run; they say what its weights know."""
-OWN_REGIONS = "ignore.yaml"
 _OF_DATA = re.compile(r"^\$(DATA|\{DATA\})/")
 
 
@@ -106,8 +105,9 @@ def pack_mixture(data: Path, pack: Pack) -> dict[str, Any]:
     Returns:
         The mixture as it stands in the archive.
     """
-    if data.is_file() and data.suffix.lower() in YAML_SUFFIXES and "sources" in (content := read_yaml(data)):
+    if is_mixture(data):
         read_mixture(data)  # says what is wrong with it
+        content = read_yaml(data)
     else:
         content = {"sources": [{"path": str(data.resolve()), "name": data.resolve().name}]}
     return content | {"sources": [_pack_source(entry, data.parent, pack) for entry in content["sources"]]}
@@ -147,12 +147,12 @@ def recipe_mixture(data: Path, pack: Pack) -> dict[str, Any]:
     Returns:
         The mixture as it stands in the archive.
     """
-    if not (data.is_file() and "sources" in (content := read_yaml(data))):
+    if not is_mixture(data):
         raise ConfigError(
             expected="a mixture with sets in $DATA for --recipe", found=str(data), fix="leave --recipe out"
         )
     read_mixture(data)
-    sources = []
+    content, sources = read_yaml(data), []
     for entry in content["sources"]:
         moved = dict(entry)
         for key in ("path", "pictures"):

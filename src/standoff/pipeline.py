@@ -118,8 +118,8 @@ class Pipeline:
         return FrameResult(frame, detections, detect, motion, ground, tracks, positions, proximities, hazards, stage_ms)
 
     def _is_near(self, proximities: Proximities) -> bool:
-        """Return whether a gap is, or within a second will be, below `detect_near_m`, for all that is known."""
-        if self.detect_near_m is None:
+        """Return whether a gap is, or within a second will be, below `detect_near_m`, where the rhythm asks for it."""
+        if self.detect_every == 1 or self.detect_near_m is None:
             return False
         soon_m = proximities.gap_m - np.maximum(np.nan_to_num(proximities.closing_mps), 0.0) * _AHEAD_S
         # A pair that is not measured may be near.

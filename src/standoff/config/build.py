@@ -122,11 +122,12 @@ def build_ground(settings: Settings, known: CameraPrior | None = None) -> Ground
         prior = CameraPrior.calibrated(survey.camera)
     if survey is not None and survey.time_s is None and not (given or ground.markers):
         return ScaleWatch(survey, prior)
-    if given and given[0].params.method != "fused" and survey is not None:
-        raise _unread("ground.survey", f"the method {given[0].params.method}")
-    if given and given[0].params.method not in ("fused", "refined"):
+    method = given[0].params.method if given else "fused"
+    if survey is not None and method != "fused":
+        raise _unread("ground.survey", f"the method {method}")
+    if method not in ("fused", "refined"):
         if len(given) > 1 or ground.markers:
-            raise _unread("more references or ground.markers", f"the method {given[0].params.method}")
+            raise _unread("more references or ground.markers", f"the method {method}")
         one = _reference(given[0], defines_frame=True)
         return ScaleWatch(ReferenceGround(one.shape, one.params, place=one.place, camera=camera), prior)
     if not (given or ground.auto or ground.markers or survey):
@@ -138,7 +139,7 @@ def build_ground(settings: Settings, known: CameraPrior | None = None) -> Ground
         camera=prior,
         # Beside something of known size, people's sizes watch over the scale; alone they would be a guess beside it.
         params=FusedParams(telemetry=ground.auto, sizes=ground.auto and not given and survey is None),
-        remember=not given or given[0].params.method == "fused",
+        remember=method == "fused",
     )
     return ScaleWatch(fused, prior)
 

@@ -91,6 +91,18 @@ def whole_folder(out: Path, *, overwrite: bool, own: Collection[str]) -> Generat
         shutil.rmtree(staging, ignore_errors=True)
 
 
+def make_folder(path: Path) -> None:
+    """Make a folder and those above it, unless they are there.
+
+    Raises:
+        OutputError: That is not possible.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise _not_writable(path, error) from error
+
+
 def _not_writable(out: Path, error: OSError) -> OutputError:
     return OutputError(
         expected="an output folder that can be written to",

@@ -10,6 +10,7 @@ from typing import Any, Final
 
 from standoff.core.errors import DataError
 from standoff.labels.documents import check_types, read_yaml, resolve_path
+from standoff.labels.layout import YAML_SUFFIXES
 from standoff.labels.types import SPLITS, Split
 from standoff.labels.yolo import labels_of
 
@@ -82,6 +83,15 @@ _TYPES: Final[Mapping[str, tuple[type, ...]]] = {
     "ignore_regions": (str,),
 }
 _MIXTURE_TYPES: Final[Mapping[str, tuple[type, ...]]] = {"classes": (list,), "sources": (list,), "seed": (int,)}
+
+
+def is_mixture(path: Path) -> bool:
+    """Tell whether a file is a mixture file, rather than a data set or its description.
+
+    Raises:
+        DataError: It is YAML that cannot be read.
+    """
+    return path.is_file() and path.suffix.lower() in YAML_SUFFIXES and "sources" in read_yaml(path)
 
 
 def read_mixture(path: Path) -> Mixture:

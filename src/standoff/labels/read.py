@@ -14,16 +14,13 @@ from standoff.core.boxes import unknown_points
 from standoff.core.errors import DataError
 from standoff.core.homography import FloatArray
 from standoff.labels.checks import check_boxes, inside
-from standoff.labels.documents import read_yaml
-from standoff.labels.layout import YAML_SUFFIXES, read_negatives, read_set
-from standoff.labels.mixture import DROP, IGNORE, Mixture, Source, read_mixture
-from standoff.labels.regions import read_regions
+from standoff.labels.layout import read_negatives, read_set
+from standoff.labels.mixture import DROP, IGNORE, Mixture, Source, is_mixture, read_mixture
+from standoff.labels.regions import OWN_REGIONS, read_regions
 from standoff.labels.source import BadPicture, SourcePicture, SourceSet
 from standoff.labels.splits import group_of, is_divided, split_pictures
 from standoff.labels.types import SPLITS, LabelledData, LabelledPicture, Problem, Split
 
-_OWN_REGIONS: Final = "ignore.yaml"
-"""In a set's folder: the regions that it says itself nothing is known of, as simulated composites have them."""
 CUT_GROUP: Final = "group in two splits"
 """Kind of problem of a set whose own splits cut a scene."""
 _NOWHERE: Final = np.zeros((0, 4))
@@ -72,7 +69,7 @@ def read_data(path: Path) -> LabelledData:
 
 
 def _open_mixture(path: Path) -> Mixture:
-    if path.is_file() and path.suffix.lower() in YAML_SUFFIXES and "sources" in read_yaml(path):
+    if is_mixture(path):
         return read_mixture(path)
     return Mixture([Source(path, path.resolve().name)])
 
@@ -185,7 +182,7 @@ def _label(
 def _read_regions(source: Source) -> dict[str, FloatArray]:
     """Return (N, 4) boxes in which nothing is known, by the stem of the picture."""
     folder = source.path if source.path.is_dir() else source.path.parent
-    path = source.ignore_regions or folder / _OWN_REGIONS
+    path = source.ignore_regions or folder / OWN_REGIONS
     return read_regions(path) if source.ignore_regions is not None or path.is_file() else {}
 
 

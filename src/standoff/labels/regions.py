@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
 from standoff.core.errors import DataError
 from standoff.core.homography import FloatArray
 from standoff.labels.documents import read_yaml
+
+OWN_REGIONS: Final = "ignore.yaml"
+"""In a set's folder: the regions that it says itself nothing is known of, as simulated composites have them."""
 
 
 def read_regions(path: Path) -> dict[str, FloatArray]:

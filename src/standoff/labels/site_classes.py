@@ -22,16 +22,8 @@ def to_site_classes(data: LabelledData) -> LabelledData:
     Raises:
         DataError: None of the classes is one of the site.
     """
-    # ONNX Runtime, which comes with it, takes long to load, and most who read labels do not need it
-    from standoff.stages.detect.class_map import map_classes
-
-    try:
-        site_names = map_classes(data.classes, {}, "the labelled pictures")
-    except ModelError as error:
-        raise DataError(
-            expected=error.expected, found=error.found, fix="map them in the `class_map` of a mixture file"
-        ) from error
-    ids = np.array([CLASS_BY_NAME[site_names[name]].id if name in site_names else -1 for name in data.classes])
+    names = site_names(data.classes, fix="map them in the `class_map` of a mixture file")
+    ids = np.array([CLASS_BY_NAME[names[name]].id if name in names else -1 for name in data.classes])
 
     def renamed(picture: LabelledPicture) -> LabelledPicture:
         class_id = ids[picture.class_id]
@@ -46,3 +38,22 @@ def to_site_classes(data: LabelledData) -> LabelledData:
 
     splits = {split: tuple(map(renamed, pictures)) for split, pictures in data.splits.items()}
     return replace(data, classes=tuple(site_class.name for site_class in CLASSES), splits=splits)
+
+
+def site_names(labels: tuple[str, ...], *, fix: str) -> dict[str, str]:
+    """Return the class of the site of each label that means one.
+
+    Args:
+        labels: Of labelled pictures.
+        fix: What to do where none does, for messages.
+
+    Raises:
+        DataError: None does.
+    """
+    # ONNX Runtime, which comes with it, takes long to load, and most who read labels do not need it
+    from standoff.stages.detect.class_map import map_classes
+
+    try:
+        return map_classes(labels, {}, "the labelled pictures")
+    except ModelError as error:
+        raise DataError(expected=error.expected, found=error.found, fix=fix) from error

@@ -17,6 +17,7 @@ from standoff.core.homography import FloatArray
 from standoff.core.pose import View
 from standoff.labels.ground_points import POINTS_FOLDER, points_line
 from standoff.labels.marking import would_be_marked
+from standoff.labels.regions import OWN_REGIONS
 from standoff.labels.types import SPLITS, Split
 from standoff.labels.views import VIEWS_FILE, GroundView, view_line
 from standoff.simulation.coco import Annotations
@@ -24,7 +25,7 @@ from standoff.simulation.truth import Row
 
 SET_FILES: Final = (
     *("images", "labels", POINTS_FOLDER, "annotations"),
-    *("ignore.yaml", VIEWS_FILE, "data.yaml", "dataset.json"),
+    *(OWN_REGIONS, VIEWS_FILE, "data.yaml", "dataset.json"),
 )
 """What a data set holds at its top."""
 
@@ -123,7 +124,7 @@ class PictureSet:
                 text = json.dumps(self._annotations[split].to_dict(f"{description}, {split}"))
                 (self._folder / "annotations" / f"{split}.json").write_text(text)
         if self._ignored:
-            (self._folder / "ignore.yaml").write_text(yaml.safe_dump(self._ignored, default_flow_style=None))
+            (self._folder / OWN_REGIONS).write_text(yaml.safe_dump(self._ignored, default_flow_style=None))
         if self._views:
             (self._folder / VIEWS_FILE).write_text("".join(self._views))
         names = {site_class.id: site_class.name for site_class in CLASSES}

@@ -8,14 +8,14 @@ import cv2
 import numpy as np
 import pytest
 from drawn_ground import frame
-from drawn_solid import box_around, distance_and_sigma, drawn_solids, lens, looking_at, motion_between
+from drawn_solid import box_around, drawn_solids
+from passing_camera import CAMERA, FPS, STILL, error_and_sigma, motion, seen, view
 
 from standoff.core.camera import CameraPrior
 from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.homography import FloatArray
-from standoff.core.pose import View
 from standoff.core.telemetry import Telemetry
-from standoff.core.types import CameraMotion, Detections, GroundMap, ImageArray, NoCameraMotion, NoGroundMap
+from standoff.core.types import Detections, ImageArray, NoGroundMap
 from standoff.evaluation.drawn_markers import draw_marker
 from standoff.stages.ground import (
     FusedGround,
@@ -31,13 +31,9 @@ from standoff.stages.ground.solid import SolidState
 from standoff.stages.ground.solid_choice import NOT_THERE
 from standoff.stages.ground.which_box import WHICH
 
-CAMERA = lens(k1=-0.05)
 FIRST = ReferenceShape.rectangle(2.0, 2.89)
 SECOND = ReferenceShape.rectangle(1.4, 1.9)
 HEIGHTS_M = (0.4, 0.25)
-FPS = 5.0
-STILL = NoCameraMotion("not told")
-PAIR_PX = np.array([[150.0, 300.0], [480.0, 120.0]])
 STANDS = np.array([-4.2, 1.3])
 """Where the second reference's first corner lies, turned by a third of a right angle."""
 
@@ -46,11 +42,6 @@ def turned(shape: ReferenceShape, place_m: FloatArray, turn_deg: float = 30.0) -
     turn = np.deg2rad(turn_deg)
     rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
     return ReferenceShape.from_corners(shape.corners_m @ rotation.T + place_m)
-
-
-def view(k: int = 0) -> View:
-    start = looking_at(CAMERA, (-0.6, 1.6), away_m=12.0, heading_deg=25.0, pitch_deg=50.0)
-    return start.changed(np.array([0.01, 0.02, -0.015, 0.5, -0.2, 0.1, 0.0, 0.0]) * k / FPS)
 
 
 def picture(k: int, *, first: bool = True, second: bool = True, place_m: FloatArray = STANDS) -> ImageArray:
@@ -65,10 +56,6 @@ def boxes(k: int, *, first: bool = True, second: bool = True, place_m: FloatArra
     return Detections(found, scores, np.full(len(found), CLASS_BY_NAME["reference"].id))
 
 
-def motion(k: int) -> CameraMotion | NoCameraMotion:
-    return STILL if k == 0 else motion_between(view(0), view(k), 0.0)
-
-
 def references(*, stated: bool = False) -> list[Reference]:
     params = ReferenceParams(size_sigma=0.0)
     second = turned(SECOND, STANDS) if stated else SECOND
@@ -81,17 +68,6 @@ def references(*, stated: bool = False) -> list[Reference]:
 def following(*given: Reference, camera: CameraPrior | None = None) -> FusedGround:
     prior = CameraPrior.calibrated(CAMERA) if camera is None else camera
     return FusedGround(given, camera=prior, params=FusedParams(sizes=False))
-
-
-def seen(result: GroundMap | NoGroundMap) -> GroundMap:
-    assert isinstance(result, GroundMap), result
-    return result
-
-
-def error_and_sigma(result: GroundMap | NoGroundMap, k: int) -> tuple[float, float]:
-    length, sigma = distance_and_sigma(seen(result), PAIR_PX)
-    one, other = view(k).to_plane(PAIR_PX)
-    return abs(length - float(np.linalg.norm(other - one))), sigma
 
 
 @pytest.mark.parametrize("stated", [False, pytest.param(True, marks=pytest.mark.live)])
@@ -194,6 +170,22 @@ def test_a_marker_that_was_moved_is_named_and_changes_nothing() -> None:
         assert error < 3.0 * sigma
     (warning,) = ground.description["warnings"]
     assert "marker 7 lies elsewhere than stated" in warning and "frame" in warning
+
+
+def test_markers_that_were_moved_are_named_once_whichever_are_in_sight() -> None:
+    told = [MARKER, MarkerPlace.lying(8, 0.9, xy_m=(3.2, 3.0))]
+    lying = [MarkerPlace.lying(7, 0.9, xy_m=(-4.0, 0.9)), MarkerPlace.lying(8, 0.9, xy_m=(2.6, 2.2))]
+    ground = FusedGround(
+        references()[:1], MarkerObserver(told), camera=CameraPrior.calibrated(CAMERA), params=FusedParams(sizes=False)
+    )
+    for k in range(12):
+        light = picture(k, second=False) / 255.0
+        for place in lying[: 1 + k // 7]:
+            draw_marker(light, marker_pattern("apriltag36h11", place.marker_id), view(k).project(place.corners_m))
+        shown = np.asarray(np.clip(np.rint(light * 255.0), 0, 255), dtype=np.uint8)
+        ground.update(frame(shown, k / FPS), boxes(k, second=False), motion(k))
+    (warning,) = ground.description["warnings"]
+    assert "marker 7 lies elsewhere than stated" in warning
 
 
 def telemetry(height_m: float, pitch_deg: float = np.nan) -> Telemetry:

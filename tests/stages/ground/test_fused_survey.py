@@ -5,32 +5,20 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from drawn_ground import frame
-from drawn_solid import box_around, distance_and_sigma, drawn_solids, lens, looking_at, motion_between
+from drawn_solid import box_around, drawn_solids
+from passing_camera import CAMERA, FPS, PAIR_PX, error_and_sigma, motion, seen, view
 
 from standoff.core.camera import CameraPrior
 from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.errors import GroundError
 from standoff.core.homography import FloatArray
-from standoff.core.pose import View
-from standoff.core.types import CameraMotion, Detections, GroundMap, ImageArray, NoCameraMotion, NoGroundMap
+from standoff.core.types import Detections, GroundMap, ImageArray, NoGroundMap
 from standoff.stages.ground import FusedGround, FusedParams, Reference, ReferenceParams, ReferenceShape, SurveyedGround
 from standoff.stages.ground.solid import SolidState
 from standoff.stages.ground.survey_observer import MISSED, NOT_YET
 
-CAMERA = lens(k1=-0.05)
 SHAPE, HEIGHT_M = ReferenceShape.rectangle(2.0, 2.89), 0.4
 POINTS_M = np.array([[-3.5, -1.5], [3.5, -0.5], [3.0, 5.0], [-4.0, 4.5], [0.5, 6.0]])
-FPS = 5.0
-PAIR_PX = np.array([[150.0, 300.0], [480.0, 120.0]])
-
-
-def view(k: int = 0) -> View:
-    start = looking_at(CAMERA, (-0.6, 1.6), away_m=12.0, heading_deg=25.0, pitch_deg=50.0)
-    return start.changed(np.array([0.01, 0.02, -0.015, 0.5, -0.2, 0.1, 0.0, 0.0]) * k / FPS)
-
-
-def motion(k: int) -> CameraMotion | NoCameraMotion:
-    return NoCameraMotion("not told") if k == 0 else motion_between(view(0), view(k), 0.0)
 
 
 def picture(k: int) -> ImageArray:
@@ -63,16 +51,8 @@ def reference(*, place_known: bool = True) -> Reference:
     return Reference(SHAPE, HEIGHT_M, params=ReferenceParams(size_sigma=0.0), place_known=place_known)
 
 
-def error_and_sigma(result: GroundMap | NoGroundMap, k: int) -> tuple[float, float]:
-    assert isinstance(result, GroundMap), result
-    length, sigma = distance_and_sigma(result, PAIR_PX)
-    one, other = view(k).to_plane(PAIR_PX)
-    return abs(length - float(np.linalg.norm(other - one))), sigma
-
-
 def place_error_m(result: GroundMap | NoGroundMap, k: int) -> float:
-    assert isinstance(result, GroundMap), result
-    found_m, _ = result.to_ground(PAIR_PX)
+    found_m, _ = seen(result).to_ground(PAIR_PX)
     return float(np.linalg.norm(found_m - view(k).to_plane(PAIR_PX), axis=1).max())
 
 
@@ -127,8 +107,7 @@ def test_a_survey_takes_over_the_frame_of_a_reference_without_a_place() -> None:
         result = ground.update(frame(picture(k), k / FPS), boxes(k), motion(k))
         error, sigma = error_and_sigma(result, k)
         assert error < 3.0 * sigma
-        assert isinstance(result, GroundMap)
-        frames.append(result.site_frame)
+        frames.append(seen(result).site_frame)
     assert frames == [0, 0, 1, 1, 1]
     assert place_error_m(result, 4) < 0.25
 
@@ -141,8 +120,7 @@ def test_a_survey_that_contradicts_the_reference_is_named_and_changes_nothing() 
     for k in range(3):
         shown = frame(picture(k), k / FPS)
         one, other = (ground.update(shown, boxes(k), motion(k)) for ground in (with_it, without))
-        assert isinstance(one, GroundMap) and isinstance(other, GroundMap)
-        np.testing.assert_array_equal(one.image_to_ground, other.image_to_ground)
+        np.testing.assert_array_equal(seen(one).image_to_ground, seen(other).image_to_ground)
     (warning,) = with_it.description["warnings"]
     assert "the surveyed points lie elsewhere than stated" in warning and "the reference is trusted" in warning
 

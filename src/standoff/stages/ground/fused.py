@@ -153,7 +153,7 @@ class FusedGround:
         for reference in self._given_references:
             reference.place.check_size(size_px)
         if self._survey is not None:
-            self._survey.check_size(size_px)
+            self._survey.survey.check_size(size_px)
         camera = prior_for(self._given_camera, size_px)
         self._forget_pictures()
         self._camera, self._size_px = camera, size_px

@@ -111,7 +111,7 @@ class PointLandmarks:
             if self._took(now, seen, moment, belief) or not self._refused(moment.frame.time_s):
                 return ""
             if belief.source != self._source.name:
-                _warn(seen, moment, belief)
+                self._warn(seen, moment, belief)
                 return ""
         fit = first_fit(seen, belief.lens.camera, self._first_prior(moment, belief), self._source.place_sigma_m)
         if isinstance(fit, NoGroundMap):
@@ -155,12 +155,12 @@ class PointLandmarks:
                 return telemetry_prior(*read)
         return level_prior(belief.lens)
 
-
-def _warn(seen: Sequence[PointObservation], moment: Moment, belief: CameraBelief) -> None:
-    names = " and ".join(one.name for one in seen)
-    verb = "lie" if len(seen) > 1 or names.endswith("points") else "lies"
-    trusted = belief.keeper or ("the survey" if belief.source == "survey" else "the first marker")
-    belief.warnings.setdefault(
-        names,
-        f"{names} {verb} elsewhere than stated, from {moment.text} on: {trusted} is trusted, it was seen first",
-    )
+    def _warn(self, seen: Sequence[PointObservation], moment: Moment, belief: CameraBelief) -> None:
+        names = " and ".join(one.name for one in seen)
+        verb = "lie" if len(seen) > 1 or names.endswith("points") else "lies"
+        trusted = belief.keeper or ("the survey" if belief.source == "survey" else "the first marker")
+        # Once for all of a kind: which of them are in sight changes from frame to frame.
+        belief.warnings.setdefault(
+            self._source.name,
+            f"{names} {verb} elsewhere than stated, from {moment.text} on: {trusted} is trusted, it was seen first",
+        )

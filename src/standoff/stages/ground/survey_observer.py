@@ -47,21 +47,13 @@ class SurveyObserver:
         self._pending = True
         self.missed = ""
 
-    def check_size(self, size_px: tuple[int, int]) -> None:
-        """Make sure that pictures of a size (width, height) have the survey's shape.
-
-        Raises:
-            GroundError: They do not.
-        """
-        self.survey.check_size(size_px)
-
     def observe(self, moment: Moment) -> list[PointObservation] | NoGroundMap:
         """Return the surveyed points in the frame that they were read from; in all others, why there are none."""
         time_s, wanted_s = moment.frame.time_s, self.survey.time_s
-        if self._pending and wanted_s is not None and time_s < wanted_s - _SAME_TIME_S:
-            return NoGroundMap(NOT_YET)
         if not self._pending:
             return NoGroundMap(self.missed)
+        if wanted_s is not None and time_s < wanted_s - _SAME_TIME_S:
+            return NoGroundMap(NOT_YET)
         self._pending = False
         if wanted_s is not None and time_s > wanted_s + _SAME_TIME_S:
             self.missed = f"{MISSED}: it is at {wanted_s:g} s, the next one at {time_s:.2f} s"

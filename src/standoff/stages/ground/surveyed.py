@@ -102,11 +102,6 @@ class SurveyedGround:
         """The lens, for pictures of the survey's size."""
         return self._surveyed.camera
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Of the points."""
-        return tuple(one["name"] for one in self.description["points"])
-
     def points_in(self, size_px: tuple[int, int]) -> tuple[FloatArray, float]:
         """Return (N, 2) the points as seen in pictures of a size (width, height), and their standard error there.
 

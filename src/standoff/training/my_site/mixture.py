@@ -13,17 +13,16 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, Final
 
-import yaml
-
 from standoff.core.classes import CLASS_BY_NAME, CLASSES
-from standoff.core.errors import DataError, ModelError, OutputError
-from standoff.core.types import Frame
-from standoff.files.whole import whole_file
+from standoff.core.errors import DataError
+from standoff.files.whole import make_folder
+from standoff.files.yaml_text import write_yaml
 from standoff.labels import LabelledData, LabelledPicture, load_picture, read_data
 from standoff.labels.mixture import IGNORE
+from standoff.labels.regions import OWN_REGIONS
+from standoff.labels.site_classes import site_names
 from standoff.stages.detect import DetectParams, OnnxDetector, find_model
-from standoff.stages.detect.class_map import map_classes
-from standoff.stages.frames.pictures import ArrayPicture
+from standoff.stages.frames import frame_from_array
 from standoff.training.run.folder import PREPARED_DATA, refuse_used
 from standoff.training.run.plan import RunPlan
 
@@ -58,7 +57,8 @@ def prepare_plan(plan: RunPlan, out: Path, say: Callable[[str], None]) -> RunPla
     """
     refuse_used(out)
     own = read_data(plan.data)
-    class_map = _class_map(own.classes)
+    mapped = site_names(own.classes, fix="name the classes as the site's, or give --config")
+    class_map = {label: mapped.get(label, IGNORE) for label in own.classes}
     absent = [one.name for one in CLASSES if one.name not in class_map.values()]
     pictures = [picture for pictures in own.splits.values() for picture in pictures]
     if absent:
@@ -68,27 +68,12 @@ def prepare_plan(plan: RunPlan, out: Path, say: Callable[[str], None]) -> RunPla
     if not holds_out:
         say("all frames are of one flight: none is held out, so that only forgetting can be measured")
     content = _mixture(plan.data, own, class_map, holds_out=holds_out)
-    try:
-        folder = out / PREPARED_DATA
-        folder.mkdir(parents=True, exist_ok=True)
-        _write_yaml(folder / "ignore.yaml", regions)
-        _write_yaml(folder / "mixture.yaml", content)
-    except OSError as error:
-        raise OutputError(
-            expected=f"to write to {out}", found=str(error.strerror), fix="choose a folder that is writable"
-        ) from error
+    folder = out / PREPARED_DATA
+    make_folder(folder)
+    write_yaml(folder / OWN_REGIONS, regions)
+    write_yaml(folder / "mixture.yaml", content)
     params = plan.params if holds_out else replace(plan.params, validate_every=plan.params.steps)
     return replace(plan, data=folder / "mixture.yaml", params=params)
-
-
-def _class_map(labels: Sequence[str]) -> dict[str, str]:
-    try:
-        mapped = map_classes(tuple(labels), {}, "the labelled pictures")
-    except ModelError as error:
-        raise DataError(
-            expected=error.expected, found=error.found, fix="name the classes as the site's, or give --config"
-        ) from error
-    return {label: mapped.get(label, IGNORE) for label in labels}
 
 
 def _unlabelled(pictures: Sequence[LabelledPicture], absent: Sequence[str]) -> dict[str, list[list[float]]]:
@@ -96,10 +81,10 @@ def _unlabelled(pictures: Sequence[LabelledPicture], absent: Sequence[str]) -> d
     ids = [CLASS_BY_NAME[name].id for name in absent]
     detector = OnnxDetector(find_model("site"), DetectParams(score_threshold=_UNLABELLED_SCORE))
     regions: dict[str, list[list[float]]] = {}
-    for index, picture in enumerate(pictures):
+    for picture in pictures:
         ignored = picture.xyxy_px[picture.ignored].tolist()
         try:
-            frame = Frame("labelled", index, float(index), ArrayPicture(load_picture(picture)))
+            frame = frame_from_array(load_picture(picture))
         except DataError:
             # Training names it and goes on without it.
             continue
@@ -114,7 +99,7 @@ def _unlabelled(pictures: Sequence[LabelledPicture], absent: Sequence[str]) -> d
 
 def _mixture(labelled: Path, own: LabelledData, class_map: dict[str, str], *, holds_out: bool) -> dict[str, Any]:
     site: dict[str, Any] = {"path": str(labelled.resolve()), "name": "site", "class_map": class_map}
-    site["ignore_regions"] = "ignore.yaml"
+    site["ignore_regions"] = OWN_REGIONS
     if not holds_out:
         site["split"] = "train"
     replayed = replay_folder()
@@ -122,8 +107,3 @@ def _mixture(labelled: Path, own: LabelledData, class_map: dict[str, str], *, ho
     weight = _REPLAY_SHARE / (1.0 - _REPLAY_SHARE) * frames / len(list((replayed / "images" / "train").iterdir()))
     replay = {"path": str(replayed / "data.yaml"), "name": "replay", "weight": round(weight, 3)}
     return {"classes": [one.name for one in CLASSES], "sources": [site, replay]}
-
-
-def _write_yaml(path: Path, content: dict[str, Any]) -> None:
-    with whole_file(path) as partial:
-        partial.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")

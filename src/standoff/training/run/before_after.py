@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import torch
 
 from standoff.evaluation.detection import DetectionScore
 from standoff.labels import LabelledData, LabelledPicture, Split
@@ -45,7 +46,13 @@ class BeforeAfter:
 
 
 def compare_before_after(
-    cfg: DarknetCfg, weights: tuple[Path, Path], data: LabelledData, *, most: int, bf16: bool
+    cfg: DarknetCfg,
+    weights: tuple[Path, Path],
+    data: LabelledData,
+    *,
+    most: int,
+    bf16: bool,
+    device: torch.device,
 ) -> list[BeforeAfter]:
     """Score the weights at the start and those that were kept on each set's held-out pictures.
 
@@ -55,6 +62,7 @@ def compare_before_after(
         data: What was trained on.
         most: At most so many pictures of each set, evenly spread.
         bf16: Compute in bfloat16 where it is safe.
+        device: To compute on.
 
     Returns:
         One for each set that holds out boxes.
@@ -64,6 +72,7 @@ def compare_before_after(
     for path in weights:
         network = DarknetNetwork(cfg)
         load_weights(network, path)
+        network.to(device)
         scores.append([validate(network, pictures, data.classes, bf16=bf16) for _, _, pictures in sets])
     return [
         BeforeAfter(source, split, before, after)

@@ -7,14 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-import yaml
-
 from standoff import __version__
 from standoff.config import read_settings_file
 from standoff.core.errors import ConfigError, OutputError
 from standoff.evaluation.detection import DetectionScore
 from standoff.files.json_text import plain, write_json
 from standoff.files.whole import whole_file
+from standoff.files.yaml_text import write_yaml
 from standoff.labels import LabelledPicture
 from standoff.labels.documents import read_json
 from standoff.labels.splits import spread
@@ -106,7 +105,7 @@ class RunFolder:
         Raises:
             OutputError: It cannot be written.
         """
-        self._write_text("run.yaml", yaml.safe_dump(plain(configuration), sort_keys=False))
+        write_yaml(self.path / "run.yaml", plain(configuration))
 
     def replace_plan(self, configuration: dict[str, Any], step: int) -> None:
         """Record what a run goes on with; what held until this step, if different, stays as `run-until-STEP.yaml`.
@@ -116,7 +115,7 @@ class RunFolder:
         """
         before = read_run(self.path)
         if before != plain(configuration):
-            self._write_text(f"run-until-{step}.yaml", yaml.safe_dump(before, sort_keys=False))
+            write_yaml(self.path / f"run-until-{step}.yaml", before)
             self.write_plan(configuration)
 
     def read_start(self) -> dict[str, Any]:

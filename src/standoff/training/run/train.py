@@ -195,6 +195,7 @@ def _compare(plan: RunPlan, data: LabelledData, folder: RunFolder) -> list[Befor
         data,
         most=params.validate_pictures,
         bf16=params.bf16,
+        device=Crew.join().device,
     )
 
 

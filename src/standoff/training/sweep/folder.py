@@ -8,12 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from standoff import __version__
 from standoff.core.errors import ConfigError
 from standoff.files.json_text import write_json
 from standoff.files.whole import whole_file
+from standoff.files.yaml_text import write_yaml
 from standoff.labels.documents import read_json
 from standoff.training.run.plan import Overrides
 from standoff.training.sweep.figure import draw_sweep
@@ -47,8 +46,7 @@ class SweepFolder:
         Raises:
             OutputError: It cannot be written.
         """
-        with whole_file(self.plan) as path:
-            path.write_text(yaml.safe_dump(sweep.to_dict(), sort_keys=False), encoding="utf-8")
+        write_yaml(self.plan, sweep.to_dict())
 
     def write_results(self, results: Sequence[Result]) -> None:
         """Write the table as Markdown and as JSON, and the curves of what was validated.

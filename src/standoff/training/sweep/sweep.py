@@ -13,6 +13,7 @@ from time import monotonic
 from typing import Any
 
 from standoff.core.errors import StandoffError
+from standoff.files.whole import make_folder
 from standoff.labels import LabelledData
 from standoff.training.run.checkpoint import has_checkpoint
 from standoff.training.run.data_checks import open_data, report_near_duplicates
@@ -70,7 +71,7 @@ def run_sweep(sweep: Sweep, out: Path, listener: SweepListener, *, resumes: bool
     begun = [name for name in waiting if crew.agree(board.is_begun(name))]
     data = _checked_data(sweep, [name for name in waiting if name not in begun], listener, leads=crew.leads)
     if crew.leads:
-        out.mkdir(parents=True, exist_ok=True)
+        make_folder(out)
         folder.write_plan(sweep)
     for name in sweep.scenarios:
         if name in waiting:
