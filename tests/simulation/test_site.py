@@ -28,7 +28,7 @@ def _is_under_a_crane(site: Site) -> bool:
         ("noon", 1),
         pytest.param("afternoon", 5, marks=pytest.mark.live),
         pytest.param("hazy", 7, marks=pytest.mark.live),
-        ("overcast", 9),
+        pytest.param("overcast", 9, marks=pytest.mark.live),
     ],
 )
 def test_daylight_is_exposed_to_the_middle_of_the_scale(condition: Condition, seed: int) -> None:

@@ -172,6 +172,7 @@ def test_a_marker_that_was_moved_is_named_and_changes_nothing() -> None:
     assert "marker 7 lies elsewhere than stated" in warning and "frame" in warning
 
 
+@pytest.mark.live
 def test_markers_that_were_moved_are_named_once_whichever_are_in_sight() -> None:
     told = [MARKER, MarkerPlace.lying(8, 0.9, xy_m=(3.2, 3.0))]
     lying = [MarkerPlace.lying(7, 0.9, xy_m=(-4.0, 0.9)), MarkerPlace.lying(8, 0.9, xy_m=(2.6, 2.2))]

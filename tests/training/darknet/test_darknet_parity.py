@@ -57,7 +57,7 @@ def _noise(size_px: tuple[int, int], seed: int) -> Picture:
 
 
 @pytest.mark.shared
-@pytest.mark.parametrize("size_px", [(320, 320), (768, 576)])
+@pytest.mark.parametrize("size_px", [(320, 320), pytest.param((768, 576), marks=pytest.mark.live)])
 def test_yolo_fastest_with_its_real_weights_decodes_as_in_opencv(
     shared_data: Path, tmp_path: Path, size_px: tuple[int, int]
 ) -> None:
@@ -80,7 +80,7 @@ def test_yolov3_tiny_decodes_as_in_opencv(
     assert worst.max() <= tolerances.DARKNET_DECODED
 
 
-@pytest.mark.parametrize(("name", "seed"), [("yolo-fastest-xl-8-16", 0), ("yolo-fastest-xl-8-16-32", 1)])
+@pytest.mark.parametrize(("name", "seed"), few([("yolo-fastest-xl-8-16-32", 1), ("yolo-fastest-xl-8-16", 0)]))
 def test_yolo_fastest_with_a_stride_8_head_decodes_as_in_opencv(
     make_darknet_files: Callable[[str, int], DarknetFiles], tmp_path: Path, name: str, seed: int
 ) -> None:
