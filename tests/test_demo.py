@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from importlib.resources import files
 from itertools import islice
 from pathlib import Path
@@ -12,10 +13,12 @@ import numpy as np
 import pytest
 from tolerances import CODED_FRAME_LEVELS, SCENE_DISTANCE_M
 
+from standoff.config import load_settings
 from standoff.core.classes import CLASSES
 from standoff.core.homography import FloatArray
 from standoff.core.types import ImageArray
 from standoff.evaluation.paper import Clip, load_clip
+from standoff.monitor import open_run
 from standoff.stages.frames import open_source
 
 FILM = Path(str(files("standoff"))) / "demo"
@@ -88,3 +91,15 @@ def test_the_film_can_be_rendered_again(film: Clip) -> None:
             places_m = {row["entity_id"]: (row["x_m"], row["y_m"]) for row in shot.entities}
             for entity_id, xy_m in zip(film.entity_id.tolist(), film.xy_m[frame], strict=True):
                 assert places_m[entity_id] == pytest.approx(xy_m, abs=SCENE_DISTANCE_M)
+
+
+@pytest.mark.parametrize(
+    "every", [25, pytest.param(12, marks=pytest.mark.live), pytest.param(5, marks=pytest.mark.live)]
+)
+def test_the_films_danger_is_recognised_at_few_frames_a_second(every: int, tmp_path: Path) -> None:
+    settings = load_settings(FILM / "reference.yaml", {"every": every, "outputs": ()})
+    events = [event for result in open_run(FILM / "video.mp4", tmp_path / "out", settings) for event in result.hazards]
+    assert "danger" in {event.severity for event in events}
+    assert len({event.hazard_id for event in events}) == 2
+    counts = json.loads((tmp_path / "out" / "run.json").read_text())["counts"]
+    assert counts["unfollowed_detections"] == 0 < counts["sure_detections"]

@@ -21,6 +21,7 @@ from standoff.core.protocols import (
     Tracker,
 )
 from standoff.core.types import Detections, Frame, FrameResult, Hazard, Outcome, Proximities, Sink
+from standoff.core.unfollowed import SURE_SCORE, unfollowed
 
 _LOG = logging.getLogger(__name__)
 
@@ -45,6 +46,7 @@ class Pipeline:
             is near, or may be, it runs on every frame (`detect_near_m`).
         motion: Reads every frame.
         ground: Reads every frame.
+        sure_score: What the detector is so sure of has to be in a track.
         sinks: By name. One that fails is logged and left out from then on; the others go on.
         sink_errors: Message of each sink that failed.
     """
@@ -60,6 +62,7 @@ class Pipeline:
     sinks: Mapping[str, Sink] = field(default_factory=dict)
     detect_every: int = 1
     detect_near_m: float | None = None
+    sure_score: float = SURE_SCORE
     sink_errors: dict[str, str] = field(default_factory=dict)
 
     def run(self) -> Generator[FrameResult, None, None]:
@@ -105,17 +108,20 @@ class Pipeline:
             ground = self.ground.update(frame, detections, motion)
         with _clocked(stage_ms, "track"):
             tracks = (
-                self.tracker.update(frame.time_s, detections, motion)
+                self.tracker.update(frame.time_s, detections, motion, ground)
                 if detect
                 else self.tracker.coast(frame.time_s, motion)
             )
+            lost = unfollowed(detections, tracks, self.sure_score)
         with _clocked(stage_ms, "locate"):
             positions = self.locator.update(frame.time_s, tracks, ground)
         with _clocked(stage_ms, "proximity"):
             proximities = self.proximity.update(frame.time_s, positions, ground)
         with _clocked(stage_ms, "hazard"):
-            hazards = self.hazard.update(frame.time_s, positions, proximities, ground)
-        return FrameResult(frame, detections, detect, motion, ground, tracks, positions, proximities, hazards, stage_ms)
+            hazards = self.hazard.update(frame.time_s, positions, proximities, ground, lost)
+        return FrameResult(
+            frame, detections, detect, motion, ground, tracks, positions, proximities, hazards, stage_ms, lost
+        )
 
     def _is_near(self, proximities: Proximities) -> bool:
         """Return whether a gap is, or within a second will be, below `detect_near_m`, where the rhythm asks for it."""

@@ -180,7 +180,7 @@ def run(
     if ground_overrides := _ground_overrides(ground, reference_box, camera):
         overrides["ground"] = ground_overrides
     opened = open_run(source, out, load_settings(config, overrides), overwrite=overwrite)
-    stages = opened.pipeline.motion, opened.pipeline.ground
+    stages = opened.pipeline.motion, opened.pipeline.ground, opened.pipeline.hazard
     known = stage_warnings(*stages)
     for warning in (*opened.source.warnings, *known):
         typer.echo(f"standoff: warning: {warning}", err=True)
@@ -262,7 +262,9 @@ def tell(record_file: Path, *, as_json: bool, quiet: bool) -> None:
 
 
 def exit_status(record_file: Path) -> int:
-    """Return 1 for a run that was interrupted, did not measure anything, or lost an output."""
+    """Return 1 for a run that was interrupted, did not measure much that it saw, or lost an output."""
+    from standoff.core.unfollowed import are_many
+
     record = json.loads(record_file.read_text(encoding="utf-8"))
     if record["status"] == "interrupted":
         typer.echo("standoff: interrupted; what was written up to then is whole.", err=True)
@@ -270,4 +272,8 @@ def exit_status(record_file: Path) -> int:
     unmeasured = record["counts"]["frames_with_map"] == 0
     if unmeasured:
         typer.echo("standoff: no frame could be measured; run.json has the reasons.", err=True)
-    return int(unmeasured or bool(record["sink_errors"]))
+    counts = record["counts"]
+    untracked = are_many(counts["unfollowed_detections"], counts["sure_detections"])
+    if untracked:
+        typer.echo("standoff: many sure detections are in no track; their distances are not known.", err=True)
+    return int(unmeasured or untracked or bool(record["sink_errors"]))

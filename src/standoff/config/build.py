@@ -238,4 +238,5 @@ def build_pipeline(settings: Settings, frames: Iterable[Frame], camera: CameraPr
         hazard=build_stage("hazard", settings),
         detect_every=settings.detect_every,
         detect_near_m=settings.detect_near_m,
+        sure_score=settings.track.start_score,
     )

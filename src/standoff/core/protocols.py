@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol, runtime_checkable
 
+from standoff.core.homography import BoolArray
 from standoff.core.types import (
     CameraMotion,
     Detections,
@@ -60,7 +61,7 @@ class Ground(Protocol):
 class Tracker(Protocol):
     """Follow entities over time."""
 
-    def update(self, time_s: float, detections: Detections, motion: AnyMotion) -> Tracks:
+    def update(self, time_s: float, detections: Detections, motion: AnyMotion, ground: AnyGround) -> Tracks:
         """Return the live tracks after a frame on which the detector ran."""
         ...
 
@@ -89,9 +90,14 @@ class HazardMonitor(Protocol):
     """Decide when somebody is in danger."""
 
     def update(
-        self, time_s: float, positions: GroundPositions, proximities: Proximities, ground: AnyGround
+        self,
+        time_s: float,
+        positions: GroundPositions,
+        proximities: Proximities,
+        ground: AnyGround,
+        unfollowed: BoolArray,
     ) -> tuple[Hazard, ...]:
-        """Return the events of this frame."""
+        """Return the events of this frame; `unfollowed` (K,) tells which of its sure detections no track shows."""
         ...
 
     def close(self, time_s: float) -> tuple[Hazard, ...]:

@@ -332,6 +332,7 @@ class FrameResult:
         proximities: All configured pairs.
         hazards: The events of this frame, not the state.
         stage_ms: Milliseconds spent in each stage on this frame; sinks add theirs ("sinks.NAME") one after another.
+        unfollowed: (K,) which of the frame's sure detections no track shows; left out: there were none.
     """
 
     frame: Frame
@@ -344,6 +345,7 @@ class FrameResult:
     proximities: Proximities
     hazards: tuple[Hazard, ...]
     stage_ms: Mapping[str, float]
+    unfollowed: BoolArray = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
 
 
 @dataclass(frozen=True, slots=True)

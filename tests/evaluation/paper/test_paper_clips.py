@@ -15,7 +15,7 @@ from standoff.config import Settings, build_stage
 from standoff.config.settings import StageName
 from standoff.core.camera import CameraPrior
 from standoff.core.errors import DataError
-from standoff.core.types import Detections, Frame, NoCameraMotion
+from standoff.core.types import Detections, Frame, NoCameraMotion, NoGroundMap
 from standoff.evaluation.paper import BoxError, Clip, Trial, evaluate_clip, load_clip
 from standoff.evaluation.paper.localisation import true_scale_m_per_px
 from standoff.evaluation.paper.trial import settings_for
@@ -136,7 +136,7 @@ def test_true_boxes_are_the_truths_own(clip_folder: Path) -> None:
     unseen = drawn_clip.UNSEEN[0]
     for index, seen in ((3, [1, 2, 3]), (unseen, [1, 2])):
         detections = boxes.detect(frame_from_array(PICTURE, index=index))
-        tracks = boxes.update(0.1 * index, detections, NoCameraMotion("not estimated"))
+        tracks = boxes.update(0.1 * index, detections, NoCameraMotion("not estimated"), NoGroundMap("not looked for"))
         assert tracks.track_id.tolist() == seen
         rows = np.searchsorted(clip.entity_id, seen)
         assert (tracks.xyxy_px == clip.box_px[index, rows]).all()

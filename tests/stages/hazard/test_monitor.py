@@ -13,6 +13,7 @@ from standoff.core.types import GroundMap, GroundPositions, Hazard, NoGroundMap,
 from standoff.stages.hazard import HazardMonitor, HazardParams
 
 GROUND = GroundMap(np.eye(3), np.zeros((9, 9)), (1920, 1080), "exact", 0.02)
+FOLLOWED = np.zeros(1, dtype=np.bool_)
 NO_GROUND = NoGroundMap("reference not found")
 CUT_OFF = "cut off by the picture's edge"
 NAN = math.nan
@@ -64,7 +65,7 @@ def events_of(
     for index, gaps in enumerate(frames):
         ground = gaps if isinstance(gaps, NoGroundMap) else GROUND
         rows = frame({(1, 2): NAN} if isinstance(gaps, NoGroundMap) else gaps)
-        events += monitor.update(step_s * index, *rows, ground)
+        events += monitor.update(step_s * index, *rows, ground, FOLLOWED)
     return events
 
 
@@ -118,13 +119,15 @@ def test_caution_takes_the_gap_smaller_by_sigmas() -> None:
     params = HazardParams(caution_sigmas=2.0)
     for sigma_m, expected in ((0.1, 0), (1.0, 1)):
         monitor = HazardMonitor(params)
-        events = [e for i in range(5) for e in monitor.update(STEP_S * i, *frame({(1, 2): 2.0}, sigma_m), GROUND)]
+        events = [
+            e for i in range(5) for e in monitor.update(STEP_S * i, *frame({(1, 2): 2.0}, sigma_m), GROUND, FOLLOWED)
+        ]
         assert len(events) == expected
 
 
 def test_a_cautious_monitor_cannot_measure_without_a_sigma() -> None:
     monitor = HazardMonitor(HazardParams(caution_sigmas=2.0))
-    events = [e for i in range(12) for e in monitor.update(STEP_S * i, *frame({(1, 2): 9.0}, NAN), GROUND)]
+    events = [e for i in range(12) for e in monitor.update(STEP_S * i, *frame({(1, 2): 9.0}, NAN), GROUND, FOLLOWED)]
     assert [(event.phase, event.severity, event.reason) for event in events] == [("opened", "unknown", "not measured")]
 
 
@@ -250,7 +253,7 @@ def test_the_end_of_the_stream_closes_everything_that_is_open() -> None:
     opened = [
         event
         for index in range(4)
-        for event in monitor.update(STEP_S * index, *frame({(1, 2): -1.0, (3, 4): 0.5, (5, 6): 30.0}), GROUND)
+        for event in monitor.update(STEP_S * index, *frame({(1, 2): -1.0, (3, 4): 0.5, (5, 6): 30.0}), GROUND, FOLLOWED)
     ]
     closed = monitor.close(1.0)
     assert [(event.phase, event.time_s, event.reason) for event in closed] == [("closed", 1.0, "end of stream")] * 2
@@ -258,7 +261,7 @@ def test_the_end_of_the_stream_closes_everything_that_is_open() -> None:
     assert [event.gap_m for event in closed] == [-1.0, 0.5]
     assert monitor.close(1.0) == ()
     unmapped = HazardMonitor()
-    unmapped.update(0.0, GroundPositions.empty(), Proximities.empty(), NO_GROUND)
+    unmapped.update(0.0, GroundPositions.empty(), Proximities.empty(), NO_GROUND, FOLLOWED)
     assert [(event.rule, event.phase) for event in unmapped.close(0.1)] == [("measurement", "closed")]
 
 
@@ -266,7 +269,7 @@ def test_a_reset_forgets_and_leaves_other_streams_alone() -> None:
     first, second = HazardMonitor(CALM), HazardMonitor(CALM)
     for monitor in (first, second):
         for index in range(4):
-            monitor.update(STEP_S * index, *frame({(1, 2): -1.0}), GROUND)
+            monitor.update(STEP_S * index, *frame({(1, 2): -1.0}), GROUND, FOLLOWED)
     first.reset()
     assert first.close(1.0) == ()
     assert len(second.close(1.0)) == 1
@@ -290,7 +293,7 @@ def test_every_hazard_is_opened_first_and_closed_last_at_the_end_of_the_stream(
     for index, gaps in enumerate(frames):
         ground = gaps if isinstance(gaps, NoGroundMap) else GROUND
         rows = frame({(1, 2): NAN} if isinstance(gaps, NoGroundMap) else gaps)
-        events += monitor.update(STEP_S * index, *rows, ground)
+        events += monitor.update(STEP_S * index, *rows, ground, FOLLOWED)
     events += monitor.close(STEP_S * len(frames))
     lives: dict[str, list[Hazard]] = {}
     for event in events:
@@ -343,8 +346,8 @@ def test_a_wider_buffer_or_radius_never_removes_a_hazard(
 def test_the_order_of_the_rows_does_not_matter(gaps: list[Gaps]) -> None:
     straight, mixed = HazardMonitor(CALM), HazardMonitor(CALM)
     for index, pairs in enumerate(gaps):
-        first = straight.update(STEP_S * index, *frame(pairs), GROUND)
-        second = mixed.update(STEP_S * index, *frame(pairs, order=[2, 0, 1]), GROUND)
+        first = straight.update(STEP_S * index, *frame(pairs), GROUND, FOLLOWED)
+        second = mixed.update(STEP_S * index, *frame(pairs, order=[2, 0, 1]), GROUND, FOLLOWED)
         assert [(e.track_ids, e.phase, e.severity) for e in first] == [
             (e.track_ids, e.phase, e.severity) for e in second
         ]

@@ -19,7 +19,7 @@ def velocity_after(
     estimator = VelocityEstimator(window_s, min_span_s)
     velocity_mps = np.zeros((1, 2))
     for time_s, xy_m in zip(times_s.tolist(), path_m, strict=True):
-        velocity_mps = estimator.update(time_s, np.array([1]), xy_m[None], np.array([True]))
+        velocity_mps = estimator.update(time_s, np.array([1]), xy_m[None], np.array([True]), np.array([True]))
     last: FloatArray = velocity_mps[0]
     return last
 
@@ -59,7 +59,7 @@ def test_velocity_is_unknown_until_three_points_span_the_least_time() -> None:
     assert np.isnan(velocity_after(np.array([0.0, 0.5]), path_m[:2])).all()
     assert np.isnan(velocity_after(np.array([0.0, 0.1, 0.2]), path_m[:3])).all()
     assert np.isfinite(velocity_after(np.array([0.0, 0.1, 0.3]), path_m[:3])).all()
-    assert np.isnan(velocity_after(np.array([0.0, 0.1, 0.3, 1.2, 1.4]), path_m)).all()
+    assert np.isnan(velocity_after(np.array([0.0, 0.1, 0.2, 0.25, 0.28]), path_m)).all()
 
 
 def test_untrusted_positions_add_nothing_and_ended_tracks_are_forgotten() -> None:
@@ -67,9 +67,29 @@ def test_untrusted_positions_add_nothing_and_ended_tracks_are_forgotten() -> Non
     both, one = np.array([4, 9]), np.array([9])
     for step in range(5):
         xy_m = np.array([[step, 0.0], [0.0, step]])
-        found = estimator.update(0.1 * step, both, xy_m, np.array([True, step != 2]))
+        found = estimator.update(0.1 * step, both, xy_m, np.array([True, True]), np.array([True, step != 2]))
     np.testing.assert_allclose(found, [[10.0, 0.0], [0.0, 10.0]], rtol=GEOMETRY_REL, atol=GEOMETRY_REL)
-    estimator.update(0.5, one, np.array([[0.0, 5.0]]), np.array([True]))
-    returned = estimator.update(0.6, both, np.array([[6.0, 0.0], [0.0, 6.0]]), np.array([True, True]))
+    estimator.update(0.5, one, np.array([[0.0, 5.0]]), np.array([True]), np.array([True]))
+    returned = estimator.update(
+        0.6, both, np.array([[6.0, 0.0], [0.0, 6.0]]), np.array([True, True]), np.array([True, True])
+    )
     assert np.isnan(returned[0]).all()
     assert np.isfinite(returned[1]).all()
+
+
+@given(velocity=st.tuples(COORDINATES, COORDINATES), gap_s=st.floats(0.6, 30.0))
+def test_a_film_of_few_frames_has_velocities_too(velocity: tuple[float, float], gap_s: float) -> None:
+    times_s = gap_s * np.arange(6)
+    path_m = times_s[:, None] * np.array(velocity)
+    assert np.isnan(velocity_after(times_s[:2], path_m[:2])).all()
+    found = velocity_after(times_s, path_m)
+    np.testing.assert_allclose(found, velocity, rtol=GEOMETRY_REL, atol=GEOMETRY_REL)
+
+
+def test_where_nobody_was_seen_for_long_old_places_tell_no_velocity() -> None:
+    estimator = VelocityEstimator(1.0, 0.3)
+    one = np.array([1])
+    for index in range(60):
+        seen, trusted = np.array([True]), np.array([index < 10 or index > 57])
+        found = estimator.update(0.1 * index, one, np.array([[0.1 * index, 0.0]]), seen, trusted)
+    assert np.isnan(found).all()

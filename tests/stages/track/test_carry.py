@@ -10,12 +10,13 @@ from drawn_ground import lens, view
 from standoff.core import homography
 from standoff.core.camera import Camera
 from standoff.core.homography import FloatArray
-from standoff.core.types import CameraMotion, Detections, NoCameraMotion
+from standoff.core.types import CameraMotion, Detections, NoCameraMotion, NoGroundMap
 from standoff.stages.track import Tracker
 
 FPS = 5.0
 LENS = lens()
 UNKNOWN = NoCameraMotion("not estimated")
+UNMAPPED = NoGroundMap("not looked for")
 PEOPLE_M = np.array([[-3.0, 1.0], [-1.0, -1.5], [0.5, 2.0], [2.0, -1.0], [3.0, 1.5]])
 WALK_MPS = np.array([[0.0, 0.0], [0.0, 0.0], [1.2, 0.0], [0.0, -1.0], [-1.0, 0.6]])
 
@@ -48,7 +49,7 @@ def motion(index: int, camera: Camera | None = None, key: int = 0) -> CameraMoti
 def ids(tracker: Tracker, motions: list[CameraMotion | NoCameraMotion]) -> set[int]:
     found: set[int] = set()
     for index, step in enumerate(motions):
-        found |= set(tracker.update(index / FPS, boxes(index / FPS), step).track_id.tolist())
+        found |= set(tracker.update(index / FPS, boxes(index / FPS), step, UNMAPPED).track_id.tolist())
     return found
 
 
@@ -64,8 +65,8 @@ def test_a_new_keyframe_every_fourth_frame_changes_nothing() -> None:
     once, often = Tracker(), Tracker()
     for index in range(15):
         key = max(index - 1, 0) // 4 * 4
-        first = once.update(index / FPS, boxes(index / FPS), motion(index))
-        second = often.update(index / FPS, boxes(index / FPS), motion(index, key=key))
+        first = once.update(index / FPS, boxes(index / FPS), motion(index), UNMAPPED)
+        second = often.update(index / FPS, boxes(index / FPS), motion(index, key=key), UNMAPPED)
         assert (first.track_id == second.track_id).all()
         assert first.xyxy_px == pytest.approx(second.xyxy_px, abs=1e-6)
 
@@ -74,7 +75,7 @@ def test_a_new_keyframe_every_fourth_frame_changes_nothing() -> None:
 def test_boxes_coast_over_the_ground_and_not_over_the_picture(camera: Camera | None) -> None:
     tracker, shot = Tracker(), camera or LENS
     for index in range(12):
-        tracker.update(index / FPS, boxes(index / FPS, shot), motion(index, camera))
+        tracker.update(index / FPS, boxes(index / FPS, shot), motion(index, camera), UNMAPPED)
     for index in range(12, 15):
         tracks = tracker.coast(index / FPS, motion(index, camera))
     centres = (tracks.xyxy_px[:, :2] + tracks.xyxy_px[:, 2:]) / 2.0
@@ -86,6 +87,6 @@ def test_a_motion_after_a_loss_is_not_applied_to_frames_that_it_does_not_span() 
     plain, tracker = Tracker(), Tracker()
     motions: list[CameraMotion | NoCameraMotion] = [UNKNOWN, UNKNOWN, motion(2), UNKNOWN]
     for index, step in enumerate(motions):
-        first = plain.update(index / FPS, boxes(0.0), UNKNOWN)
-        second = tracker.update(index / FPS, boxes(0.0), step)
+        first = plain.update(index / FPS, boxes(0.0), UNKNOWN, UNMAPPED)
+        second = tracker.update(index / FPS, boxes(0.0), step, UNMAPPED)
         assert (first.xyxy_px == second.xyxy_px).all()

@@ -12,10 +12,11 @@ import tolerances
 
 from standoff.core.boxes import overlaps
 from standoff.core.homography import FloatArray
-from standoff.core.types import Detections, IntArray, NoCameraMotion
+from standoff.core.types import Detections, IntArray, NoCameraMotion, NoGroundMap
 from standoff.stages.track import Tracker, TrackParams
 
 STILL = NoCameraMotion("not estimated")
+UNMAPPED = NoGroundMap("not looked for")
 
 trackers = pytest.importorskip("trackers", reason="the peer is not installed: pip install --no-deps trackers")
 supervision = pytest.importorskip("supervision", reason="the peer's boxes are not installed: pip install supervision")
@@ -87,7 +88,9 @@ def detect_people(shared_data: Path, first: int, last: int) -> list[Detections]:
 
 def follow(seen: Sequence[Detections]) -> list[Seen]:
     tracker = Tracker()
-    tracks = [tracker.update(index / FRAMES_PER_S, detections, STILL) for index, detections in enumerate(seen)]
+    tracks = [
+        tracker.update(index / FRAMES_PER_S, detections, STILL, UNMAPPED) for index, detections in enumerate(seen)
+    ]
     return [(frame.track_id[frame.observed], frame.xyxy_px[frame.observed]) for frame in tracks]
 
 

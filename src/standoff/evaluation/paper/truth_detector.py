@@ -9,7 +9,7 @@ import numpy as np
 
 from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.homography import FloatArray
-from standoff.core.protocols import AnyMotion
+from standoff.core.protocols import AnyGround, AnyMotion
 from standoff.core.types import Detections, Frame, Tracks
 from standoff.evaluation.paper.clip import Clip
 
@@ -76,8 +76,8 @@ class TrueBoxes:
         class_id = np.concatenate([self._clip.class_id[self._shown], reference_id])
         return Detections(xyxy_px, np.ones(len(xyxy_px)), class_id)
 
-    def update(self, time_s: float, detections: Detections, motion: AnyMotion) -> Tracks:
-        """Return the last detections as tracks; the reference object is none, and motion plays no part."""
+    def update(self, time_s: float, detections: Detections, motion: AnyMotion, ground: AnyGround) -> Tracks:
+        """Return the last detections as tracks; the reference is none, and motion and ground play no part."""
         own = without_reference(detections)
         track_id = self._clip.entity_id[self._shown]
         for entity_id in track_id.tolist():

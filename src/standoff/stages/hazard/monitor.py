@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from standoff.core.homography import BoolArray
 from standoff.core.types import GroundMap, GroundPositions, Hazard, NoGroundMap, Proximities
+from standoff.stages.hazard.follow import FollowWatch
 from standoff.stages.hazard.life import Latch, OpenHazard, Reading
 from standoff.stages.hazard.pair import PairWatch
 from standoff.stages.hazard.params import HazardParams
@@ -62,7 +64,7 @@ class HazardMonitor:
     time at which it is said, `min_duration_s` after the condition began. What cannot be measured is
     never taken for safe: an open hazard becomes "unknown", a visible pair that stays unmeasured opens
     one of severity "unknown", and a stream without a ground map has one hazard of rule "measurement"
-    in place of one for each pair.
+    in place of one for each pair; where many sure detections are in no track, there is another one.
 
     Args:
         params: Settings; the defaults when left out.
@@ -70,11 +72,20 @@ class HazardMonitor:
 
     def __init__(self, params: HazardParams | None = None) -> None:
         self._params = params or HazardParams()
-        self._map = MapWatch(self._params)
-        self._pairs: dict[Pair, PairWatch] = {}
+        self.reset()
+
+    @property
+    def description(self) -> dict[str, list[str]]:
+        """What there is to say of the stream so far, for the record."""
+        return {"warnings": self._follow.warnings}
 
     def update(
-        self, time_s: float, positions: GroundPositions, proximities: Proximities, ground: GroundMap | NoGroundMap
+        self,
+        time_s: float,
+        positions: GroundPositions,
+        proximities: Proximities,
+        ground: GroundMap | NoGroundMap,
+        unfollowed: BoolArray,
     ) -> tuple[Hazard, ...]:
         """Take one frame and return its events, the stream's own first, then by pair.
 
@@ -83,8 +94,9 @@ class HazardMonitor:
             positions: For the reasons why something is not measured, and which tracks are alive.
             proximities: All configured pairs.
             ground: The frame's map, or why there is none.
+            unfollowed: (K,) which of the frame's sure detections are in no track.
         """
-        events = [self._map.update(time_s, ground)]
+        events = [self._map.update(time_s, ground), self._follow.update(time_s, unfollowed)]
         readings = _readings(proximities)
         reasons = dict(zip(positions.track_id.tolist(), positions.reason.tolist(), strict=True))
         for pair in sorted(self._pairs.keys() | readings.keys()):
@@ -103,15 +115,16 @@ class HazardMonitor:
 
     def close(self, time_s: float) -> tuple[Hazard, ...]:
         """End the stream: close everything that is open."""
-        events = [self._map.end(time_s, STREAM_ENDED)]
+        events = [self._map.end(time_s, STREAM_ENDED), self._follow.end(time_s, STREAM_ENDED)]
         events += [self._pairs[pair].end(time_s, STREAM_ENDED) for pair in sorted(self._pairs)]
-        self.reset()
+        self._map, self._pairs = MapWatch(self._params), {}
         return _said(events)
 
     def reset(self) -> None:
         """Forget everything without a word."""
         self._map = MapWatch(self._params)
-        self._pairs = {}
+        self._follow = FollowWatch(self._params)
+        self._pairs: dict[Pair, PairWatch] = {}
 
 
 def _readings(proximities: Proximities) -> dict[Pair, Reading]:

@@ -82,7 +82,7 @@ class Locator:
             covariance_m2 += map_factor_m @ map_factor_m.transpose(0, 2, 1)
             covariance_m2 += self._prior_variance_m2(tracks)[:, None, None] * np.eye(2)
         valid = np.isfinite(points_px).all(axis=1)
-        velocity_mps = self._velocities.update(time_s, tracks.track_id, xy_m, valid & tracks.observed)
+        velocity_mps = self._velocities.update(time_s, tracks.track_id, xy_m, tracks.observed, valid & tracks.observed)
         velocity_mps[~valid] = np.nan
         return GroundPositions(
             track_id=tracks.track_id,

@@ -56,6 +56,26 @@ class TrackParams:
         Ge(1),
         Doc("Detections in a row before a track is reported; those of a stream's first frame are reported at once."),
     ] = 2
+    confirm_within_s: Annotated[
+        float,
+        Ge(0),
+        Doc("Where the detector's last look was longer ago, a new track is reported at first sight."),
+    ] = 0.25
+    person_speed_mps: Annotated[
+        float,
+        Gt(0),
+        Doc("How fast people run: where boxes no longer overlap, nobody is looked for further away on the ground."),
+    ] = 4.0
+    machine_speed_mps: Annotated[
+        float,
+        Gt(0),
+        Doc("How fast machines drive, for the same."),
+    ] = 8.0
+    place_slack_m: Annotated[
+        float,
+        Ge(0),
+        Doc("How far a place on the ground may be off besides, for the same."),
+    ] = 1.0
     max_coast_s: Annotated[
         float,
         Ge(0),

@@ -10,8 +10,9 @@ from standoff.core.boxes import overlaps
 from standoff.core.classes import CLASSES, Role
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.picture_step import picture_step
+from standoff.core.protocols import AnyGround, AnyMotion
 from standoff.core.types import CameraMotion, Detections, IntArray, NoCameraMotion, Tracks
-from standoff.stages.track import foot
+from standoff.stages.track import foot, reach
 from standoff.stages.track import motion as box_motion
 from standoff.stages.track.association import assign, widen
 from standoff.stages.track.carry import carry
@@ -21,6 +22,7 @@ _ROW = np.dtype(
     [
         *box_motion.MOTION_FIELDS,
         *foot.FOOT_FIELDS,
+        *reach.PLACE_FIELDS,
         ("track_id", np.int64),
         ("score", np.float64),
         ("class_votes", np.float64, (len(CLASSES),)),
@@ -35,6 +37,7 @@ _ROLE = np.array([list(Role).index(site_class.role) for site_class in CLASSES])
 _REFERENCE = list(Role).index(Role.REFERENCE)
 _OTHER_CLASS = 0.7
 _TIME_ROUNDING_S = 1e-6
+_LEAST_CLOSENESS = 1e-6
 
 
 class Tracker:
@@ -49,6 +52,9 @@ class Tracker:
     A track is reported once it is confirmed, and coasts on its predicted box, marked as not observed,
     while the detector rests and for `max_coast_s` of misses. Missed for longer it is silent but not
     forgotten; after `max_lost_s` it ends.
+
+    Where looks are so far apart that boxes of one entity no longer overlap, a sure detection continues the track that
+    can have gone there over the ground, and a new one is reported at once: a second look would come too late.
 
     Persons continue as persons, machines as machines; among machines the class may flicker, and the
     track's class is the one with the largest sum of scores so far. Reference objects are not tracked.
@@ -70,7 +76,8 @@ class Tracker:
     >>> tracker = Tracker()
     >>> box = np.array([[10.0, 10.0, 20.0, 40.0]])
     >>> still = NoCameraMotion("not estimated")
-    >>> tracker.update(0.0, Detections(box, np.array([0.9]), np.array([0])), still).track_id
+    >>> unmapped = NoGroundMap("no reference")
+    >>> tracker.update(0.0, Detections(box, np.array([0.9]), np.array([0])), still, unmapped).track_id
     array([1])
     >>> tracker.coast(0.1, still).observed
     array([False])
@@ -88,16 +95,17 @@ class Tracker:
         """
         self._rows = np.zeros(0, _ROW)
         self._time_s = -math.inf
-        self._motion: CameraMotion | NoCameraMotion = NoCameraMotion("no frame before")
+        self._motion: AnyMotion = NoCameraMotion("no frame before")
         self._looked_s = -math.inf
 
-    def update(self, time_s: float, detections: Detections, motion: CameraMotion | NoCameraMotion) -> Tracks:
+    def update(self, time_s: float, detections: Detections, motion: AnyMotion, ground: AnyGround) -> Tracks:
         """Take in what the detector saw.
 
         Args:
             time_s: Presentation timestamp, not before the previous one.
             detections: May be empty: the detector looked and saw nothing.
             motion: How the picture of the ground moved, of this frame.
+            ground: The frame's map, or why there is none.
 
         Returns:
             The confirmed tracks in the order of their ids, coasting ones included. Boxes are filtered,
@@ -108,13 +116,15 @@ class Tracker:
         """
         self._advance(time_s, motion)
         detections = self._relevant(detections)
-        unclaimed = self._associate(detections)
+        places_m = reach.standing_m(detections, ground)
+        unclaimed = self._associate(detections, places_m, ground)
         self._end_lost()
-        self._start(detections[unclaimed & (detections.score >= self._params.start_score)])
+        new = unclaimed & (detections.score >= self._params.start_score)
+        self._start(detections[new], places_m[new], ground)
         self._looked_s = time_s
         return self._report()
 
-    def coast(self, time_s: float, motion: CameraMotion | NoCameraMotion) -> Tracks:
+    def coast(self, time_s: float, motion: AnyMotion) -> Tracks:
         """Predict all tracks to a frame on which the detector rested.
 
         Nobody looked, so no track ends and none is dropped from the report: a rest is not a miss.
@@ -132,7 +142,7 @@ class Tracker:
         self._advance(time_s, motion)
         return self._report(rested=True)
 
-    def _advance(self, time_s: float, motion: CameraMotion | NoCameraMotion) -> None:
+    def _advance(self, time_s: float, motion: AnyMotion) -> None:
         if not math.isfinite(time_s) or time_s < self._time_s:
             raise ValueError(
                 f"expected a time not before {self._time_s} s, found {time_s} s; call reset() when a new stream begins"
@@ -157,7 +167,7 @@ class Tracker:
             detections = detections[~np.triu(same_thing, k=1).any(axis=0)]
         return detections
 
-    def _associate(self, detections: Detections) -> BoolArray:
+    def _associate(self, detections: Detections, places_m: FloatArray, ground: AnyGround) -> BoolArray:
         """Continue tracks with detections; return which detections (N,) are left over."""
         unclaimed = np.ones(len(detections), dtype=np.bool_)
         if not len(self._rows) or not len(detections):
@@ -167,30 +177,45 @@ class Tracker:
         possible_unsure = ~sure & (similarity >= self._params.min_overlap_unsure)
         best_unsure = np.where(possible_unsure, similarity, 0.0).max(axis=1, keepdims=True)
         similarity[sure & (similarity < best_unsure)] = 0.0
+        closeness = self._closeness(detections, places_m, ground)
         confirmed = self._rows["confirmed"].copy()
         waiting = np.ones(len(self._rows), dtype=np.bool_)
-        for tracks, candidates, at_least in (
-            (confirmed, sure, self._params.min_overlap),
-            (confirmed, ~sure, self._params.min_overlap_unsure),
-            (~confirmed, np.ones_like(sure), self._params.min_overlap),
+        for tracks, candidates, likeness, at_least in (
+            (confirmed, sure, similarity, self._params.min_overlap),
+            (confirmed, ~sure, similarity, self._params.min_overlap_unsure),
+            (~confirmed, np.ones_like(sure), similarity, self._params.min_overlap),
+            (np.ones_like(confirmed), sure, closeness, _LEAST_CLOSENESS),
         ):
             rows, columns = np.flatnonzero(tracks & waiting), np.flatnonzero(candidates & unclaimed)
             if not len(rows) or not len(columns):
                 continue
-            first, second = assign(similarity[np.ix_(rows, columns)], at_least)
-            self._continue(rows[first], detections, columns[second])
-            waiting[rows[first]] = False
-            unclaimed[columns[second]] = False
+            first, second = assign(likeness[np.ix_(rows, columns)], at_least)
+            rows, columns = rows[first], columns[second]
+            self._continue(rows, detections, columns)
+            reach.correct(self._rows, rows, places_m[columns], ground, self._time_s)
+            waiting[rows] = False
+            unclaimed[columns] = False
         return unclaimed
 
     def _similarity(self, detections: Detections) -> FloatArray:
         """Return (M, N) overlap of tracks with detections; less for another class, 0 for another role."""
         margin = self._params.margin
         predicted_px = box_motion.to_edges(self._rows["box"])
+        overlap = overlaps(widen(predicted_px, margin), widen(detections.xyxy_px, margin))
+        return self._agreement(detections) * overlap
+
+    def _closeness(self, detections: Detections, places_m: FloatArray, ground: AnyGround) -> FloatArray:
+        """Return (M, N) closeness on the ground of the tracks that the last look saw; 0 for another role."""
+        class_id = self._class_id(self._rows)
+        closeness = reach.closeness(self._rows, class_id, places_m, ground, self._time_s, self._params)
+        just_seen: BoolArray = self._rows["seen_s"] == self._looked_s
+        return self._agreement(detections) * closeness * just_seen[:, None]
+
+    def _agreement(self, detections: Detections) -> FloatArray:
+        """Return (M, N) how well classes agree."""
         class_id = self._class_id(self._rows)[:, None]
-        agreement = np.where(class_id == detections.class_id, 1.0, _OTHER_CLASS)
-        agreement *= _ROLE[class_id] == _ROLE[detections.class_id]
-        return agreement * overlaps(widen(predicted_px, margin), widen(detections.xyxy_px, margin))
+        agreement: FloatArray = np.where(class_id == detections.class_id, 1.0, _OTHER_CLASS)
+        return agreement * (_ROLE[class_id] == _ROLE[detections.class_id])
 
     def _continue(self, which: IntArray, detections: Detections, by: IntArray) -> None:
         """Take detections `by` (K,) into tracks `which` (K,)."""
@@ -211,7 +236,7 @@ class Tracker:
         patience_s = np.where(self._rows["confirmed"], longest_s, 0.0) + _TIME_ROUNDING_S
         self._rows = self._rows[(unseen_s <= patience_s) & (unsure_s <= self._params.max_unsure_s + _TIME_ROUNDING_S)]
 
-    def _start(self, detections: Detections) -> None:
+    def _start(self, detections: Detections, places_m: FloatArray, ground: AnyGround) -> None:
         count = len(detections)
         if not count:
             return
@@ -219,11 +244,15 @@ class Tracker:
         box_motion.start(rows, box_motion.to_centre(detections.xyxy_px), self._params)
         foot.start(rows)
         foot.correct(rows, np.arange(count), detections.foot_px, detections.foot_covariance_px2)
+        reach.start(rows)
+        reach.correct(rows, np.arange(count), places_m, ground, self._time_s)
         rows["track_id"] = np.arange(self._next_id, self._next_id + count)
         rows["score"] = detections.score
         rows["class_votes"][np.arange(count), detections.class_id] = detections.score
         rows["hits"] = 1
-        rows["confirmed"] = math.isinf(self._looked_s) or self._params.confirm_hits == 1
+        # Where looks are rare, a second one would come too late.
+        waits_s = self._time_s - self._looked_s
+        rows["confirmed"] = waits_s > self._params.confirm_within_s or self._params.confirm_hits == 1
         rows["started_s"] = rows["seen_s"] = rows["sure_s"] = self._time_s
         self._next_id += count
         self._rows = np.concatenate([self._rows, rows])
