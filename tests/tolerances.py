@@ -192,3 +192,7 @@ PEER_POSE_M = 2e-3
 
 POSE_SIGMA_REL = 0.2
 """First-order standard errors of a pose against 120 trials: 6.5 % is sampling, three of those, and the curvature."""
+
+CARRIED_SURVEY_PX = 1.5
+"""A surveyed place carried along with a picture of 640 pixels: below a pixel the map is left as it is, and
+following a noisy picture by its keyframe adds some tenths."""

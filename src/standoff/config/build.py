@@ -14,6 +14,7 @@ from standoff.core.types import Frame
 from standoff.pipeline import Pipeline
 from standoff.stages.detect import OnnxDetector, RecordedDetector, find_model
 from standoff.stages.ground import (
+    FixedCamera,
     FusedGround,
     FusedParams,
     GivenPlace,
@@ -121,7 +122,7 @@ def build_ground(settings: Settings, known: CameraPrior | None = None) -> Ground
     if survey is not None and camera is None and survey.camera is not None:
         prior = CameraPrior.calibrated(survey.camera)
     if survey is not None and survey.time_s is None and not (given or ground.markers):
-        return ScaleWatch(survey, prior)
+        return ScaleWatch(FixedCamera(survey), prior)
     method = given[0].params.method if given else "fused"
     if survey is not None and method != "fused":
         raise _unread("ground.survey", f"the method {method}")

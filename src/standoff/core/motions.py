@@ -16,9 +16,12 @@ class NoCameraMotion:
 
     Attributes:
         reason: A short clause, the same words for the same cause.
+        broken: Whether the picture is another one than before (a cut, a zoom, another size, an earlier time), not
+            only one in which too little could be followed.
     """
 
     reason: str
+    broken: bool = False
 
     def __bool__(self) -> bool:
         return False

@@ -3,6 +3,7 @@
 from standoff.stages.ground.boards import BoardView, find_corners, read_boards
 from standoff.stages.ground.calibration import CalibrationResult, calibrate, calibrate_views
 from standoff.stages.ground.camera_file import load_camera, save_camera
+from standoff.stages.ground.fixed_camera import FixedCamera
 from standoff.stages.ground.fused import FusedGround
 from standoff.stages.ground.marker_family import MARKER_FAMILIES, MarkerFamily, marker_pattern
 from standoff.stages.ground.marker_observer import MarkerObserver
@@ -26,6 +27,7 @@ __all__ = [
     "MARKER_FAMILIES",
     "BoardView",
     "CalibrationResult",
+    "FixedCamera",
     "FusedGround",
     "FusedParams",
     "GivenPlace",

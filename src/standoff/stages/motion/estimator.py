@@ -27,11 +27,12 @@ ZOOMED = "the camera zoomed"
 RESIZED = "the picture's size changed"
 TURNED_BACK = "the clock went backwards"
 TOO_LITTLE = "too little to follow"
-_NAMED = (CUT, ZOOMED, RESIZED, TURNED_BACK)
 
 _NEAREST_LEVELS, _NEAR_LEVELS, _FAR_LEVELS = 0, 1, 4
 _NEAREST_PX = 1.0
 """Where the last picture's points were this near to where they were looked for, the next one's will be near enough."""
+
+_HOME_EVERY_S = 0.5
 
 _NOISE_STEP = 0.1
 _LONGEST_STEP = 3.0
@@ -44,7 +45,8 @@ class MotionEstimator:
     Points spread over the picture are followed by Lucas-Kanade from the keyframe itself, not from frame to frame, so
     that errors do not add up; the motion so far says where to begin looking. Boxes of people and machines are left
     out, and the plane that most of the other points share is taken for the ground. A new keyframe is taken where the
-    view has changed much; its own motion still refers to the old one.
+    view has changed much; its own motion still refers to the old one. The stream's first keyframe is kept, and looked
+    for again where the thread to it was torn: so a camera that stands still is known to stand where it stood.
 
     Args:
         params: Settings; None takes the defaults.
@@ -82,6 +84,8 @@ class MotionEstimator:
         self._shown_s = -np.inf
         self._movers.forget()
         self._key: Keyframe | None = None
+        self._home: Keyframe | None = None
+        self._astray, self._sought_s = False, -np.inf
         self._now: CameraMotion | NoCameraMotion = NoCameraMotion(TOO_LITTLE)
         self._pose, self._pose_s = np.eye(3), -np.inf
         self._step: FloatArray | None = None
@@ -117,9 +121,9 @@ class MotionEstimator:
         movers_px = self._movers.look(frame.time_s, detections, self._step)
         result = self._looked_at(picture, movers_px)
         if broken:
-            result = NoCameraMotion(broken)
+            result = NoCameraMotion(broken, broken=True)
         self._before, self._before_movers_px, self._shown_s = picture, movers_px, frame.time_s
-        what = result.reason if isinstance(result, NoCameraMotion) and result.reason in _NAMED else ""
+        what = result.reason if isinstance(result, NoCameraMotion) and result.broken else ""
         self._breaks.note(frame, what, repeated=False)
         return result
 
@@ -144,7 +148,8 @@ class MotionEstimator:
         if self._key is None:
             self._begin(picture, movers_px)
             return self._now
-        match = None if picture.is_blank() else self._match(self._key, picture, movers_px)
+        match = None if picture.is_blank() else self._home_match(picture, movers_px)
+        match = match or (None if picture.is_blank() else self._match(self._key, picture, movers_px))
         if match is None:
             return self._lost(picture, movers_px)
         step, elapsed_s = match.plane.matrix @ homography.invert(self._pose), picture.time_s - self._pose_s
@@ -152,7 +157,7 @@ class MotionEstimator:
         self._step, self._step_s, self._surprise_px = step, elapsed_s, match.surprise_px
         if self._zoom.zooms(step, elapsed_s, picture.size_px):
             self._begin(picture, movers_px)
-            return NoCameraMotion(ZOOMED)
+            return NoCameraMotion(ZOOMED, broken=True)
         worn_out = self._key.is_worn_out(match, np.array(picture.size_px) / 2.0)
         if worn_out:
             match = self._key.find_better(picture, match, movers_px)
@@ -205,11 +210,22 @@ class MotionEstimator:
             self._key, self._pose = nearer, np.eye(3)
         return match
 
+    def _home_match(self, picture: FollowedPicture, movers_px: FloatArray) -> Match | None:
+        """Look for the first keyframe where it is not known how the present one lies to it."""
+        if not self._astray or self._home is None or picture.time_s - self._sought_s < _HOME_EVERY_S:
+            return None
+        self._sought_s = picture.time_s
+        match = self._home.find(picture, self._home.expect(np.eye(3), None, 1.0), movers_px, _FAR_LEVELS)
+        if match is not None:
+            # How the picture came here from the one before is not known; that it has just stood still is near enough.
+            self._key, self._pose, self._astray = self._home, match.plane.matrix, False
+        return match
+
     def _lost(self, picture: FollowedPicture, movers_px: FloatArray) -> NoCameraMotion:
         self._forget_step()
         before = self._before
         cut = before is not None and not picture.is_blank() and picture.likeness(before) < self._params.cut_likeness
-        self._now = NoCameraMotion(CUT if cut else TOO_LITTLE)
+        self._now = NoCameraMotion(CUT, broken=True) if cut else NoCameraMotion(TOO_LITTLE)
         result = self._now
         if cut or picture.time_s - self._pose_s > self._params.max_lost_s:
             self._begin(picture, movers_px)
@@ -218,6 +234,7 @@ class MotionEstimator:
     def _begin(self, picture: FollowedPicture, movers_px: FloatArray) -> None:
         """Start from a picture that nothing before is connected with."""
         self._key = None
+        self._astray, self._sought_s = self._home is not None, picture.time_s
         self._now = NoCameraMotion(TOO_LITTLE)
         self._pose_s = picture.time_s
         self._renew(picture, movers_px)
@@ -227,6 +244,7 @@ class MotionEstimator:
         key = Keyframe(picture, movers_px, self._lens, self._params)
         if key.usable:
             self._key, self._pose = key, np.eye(3)
+            self._home = self._home or key
             self._now = self._motion_since(key, np.eye(3), np.zeros((9, 9)))
 
     def _forget_step(self) -> None:
