@@ -52,7 +52,7 @@ def test_one_frame_from_tracks_to_hazards(
     grounds = [ground_map(camera) for _ in range(1 if map_kind == "fixed" else 2)]
     locator, meter, monitor = Locator(), ProximityMeter(ProximityParams(pairs=pairs)), HazardMonitor()
     tracks = ten_tracks()
-    frame = 0
+    frame, followed = 0, np.zeros(1, dtype=np.bool_)
 
     def one_frame() -> int:
         nonlocal frame
@@ -60,7 +60,7 @@ def test_one_frame_from_tracks_to_hazards(
         time_s, ground = frame * FRAME_S, grounds[frame % len(grounds)]
         positions = locator.update(time_s, tracks, ground)
         proximities = meter.update(time_s, positions, ground)
-        monitor.update(time_s, positions, proximities, ground)
+        monitor.update(time_s, positions, proximities, ground, followed)
         return len(proximities)
 
     for _ in range(WARM_UP_FRAMES):

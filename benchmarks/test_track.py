@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
-from standoff.core.types import Detections, NoCameraMotion
+from standoff.core.types import Detections, NoCameraMotion, NoGroundMap
 from standoff.stages.track import Tracker, TrackParams
 
 STILL = NoCameraMotion("not estimated")
+UNMAPPED = NoGroundMap("not looked for")
 
 ENTITIES = 30
 FRAMES = 200
@@ -38,7 +39,9 @@ def test_standoff(benchmark: BenchmarkFixture) -> None:
 
     def follow() -> int:
         tracker = Tracker()
-        return sum(len(tracker.update(index / FRAMES_PER_S, seen, STILL)) for index, seen in enumerate(frames))
+        return sum(
+            len(tracker.update(index / FRAMES_PER_S, seen, STILL, UNMAPPED)) for index, seen in enumerate(frames)
+        )
 
     assert benchmark(follow) > 0.9 * ENTITIES * FRAMES
 

@@ -24,9 +24,9 @@ def pytest_configure() -> None:
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
     """Real material with its own terms, never part of the project; tests that need it skip where it is absent."""
-    folder = Path(os.environ.get("STANDOFF_SHARED_DATA", _PROJECT.parent / "shared" / "data"))
+    folder = Path(os.environ.get("SHARED_DATA", _PROJECT.parent / "shared" / "data"))
     if not folder.is_dir():
-        pytest.skip(f"the shared data folder is not here ({folder}); set STANDOFF_SHARED_DATA")
+        pytest.skip(f"the shared data folder is not here ({folder}); set SHARED_DATA")
     return folder
 
 
@@ -39,6 +39,6 @@ def opengl() -> None:
         with Renderer((64, 64)):
             pass
     except MissingDependency as error:
-        if os.environ.get("STANDOFF_REQUIRE_EGL") == "1":
+        if os.environ.get("REQUIRE_EGL") == "1":
             raise
         pytest.skip(str(error))

@@ -236,3 +236,20 @@ def test_a_reference_without_a_box_needs_a_model_that_knows_it() -> None:
         build_pipeline(people_only(proximity=pairs, ground={"reference": {"square_m": 2.0}}), frames=())
     boxed = {"reference": {"square_m": 2.0, "box_px": [1, 2, 30, 40]}}
     build_pipeline(people_only(proximity=pairs, ground=boxed), frames=())
+
+
+@pytest.mark.parametrize(
+    ("variable", "nearest"),
+    [
+        ("STANDOFF_DETECT_EVRY", "STANDOFF_DETECT_EVERY"),
+        ("STANDOFF_TRAK__MAX_COAST_S", "STANDOFF_TRACK__MAX_COAST_S"),
+        ("STANDOFF_MODELL", "STANDOFF_MODEL"),
+    ],
+)
+def test_a_misspelt_variable_is_refused_with_the_nearest_name(
+    monkeypatch: pytest.MonkeyPatch, variable: str, nearest: str
+) -> None:
+    monkeypatch.setenv(variable, "4")
+    with pytest.raises(ConfigError) as caught:
+        load_settings()
+    assert f"found {variable}." in str(caught.value) and nearest in str(caught.value)

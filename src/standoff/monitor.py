@@ -17,6 +17,7 @@ from standoff.clips import DETECTIONS_FILE
 from standoff.config import Settings, build_pipeline, build_replacement, resolved
 from standoff.core.errors import OutputError
 from standoff.core.types import FrameResult, Sink
+from standoff.files.in_use import FolderInUse
 from standoff.pipeline import Pipeline
 from standoff.stages.detect import RecordedDetector
 from standoff.stages.frames import Source, open_source
@@ -44,12 +45,20 @@ class Run:
     Attributes:
         source: Where the frames come from.
         pipeline: The stages.
-        folder: Where the outputs are.
+        folder: Where the outputs are; nobody else may write there until the run has ended.
+        record_sink: Knows what `run.json` says, or should say.
     """
 
     source: Source
     pipeline: Pipeline
     folder: Path
+    record_sink: RecordSink
+    _mark: FolderInUse
+
+    @property
+    def record(self) -> Mapping[str, Any]:
+        """What `run.json` says, or should say where it could not be written."""
+        return self.record_sink.record
 
     def __iter__(self) -> Generator[FrameResult, None, None]:
         """Yield each frame's result once it is written."""
@@ -57,6 +66,7 @@ class Run:
             yield from self.pipeline.run()
         finally:
             self.source.close()
+            self._mark.release()
 
 
 def open_run(source: Path | str, out: Path | str, settings: Settings, *, overwrite: bool = False) -> Run:
@@ -100,10 +110,13 @@ def open_run(source: Path | str, out: Path | str, settings: Settings, *, overwri
 
     extra = {name: build_replacement(name, replacement) for name, replacement in settings.extra_outputs.items()}
     folder = prepare_output(out, overwrite=overwrite)
+    mark = FolderInUse(folder)
+    # The record first, so that a folder without room is told before anything else is begun.
+    record = RecordSink(folder / RECORD, descriptions, at_close)
     own = build_sinks(settings, folder, descriptions, at_close)
-    # The record last, so that it times all others.
-    pipeline.sinks = {**own, **extra, "record": RecordSink(folder / RECORD, descriptions, at_close)}
-    return Run(frames, pipeline, folder)
+    # And closed last, so that it times all others.
+    pipeline.sinks = {**own, **extra, "record": record}
+    return Run(frames, pipeline, folder, record, mark)
 
 
 def _known_so_far(source: Source, pipeline: Pipeline) -> dict[str, Any]:

@@ -410,4 +410,7 @@ def test_what_the_detector_is_sure_of_and_no_track_shows_is_said_everywhere(
     assert record["counts"]["sure_detections"] == record["counts"]["unfollowed_detections"] == 68
     assert any("68 of 68" in warning for warning in record["warnings"])
     events = [json.loads(line) for line in (tmp_path / "out" / "hazards.jsonl").read_text().splitlines()]
-    assert [(event["rule"], event["phase"]) for event in events] == [("measurement", "opened"), ("measurement", "closed")]
+    assert [(event["rule"], event["phase"]) for event in events] == [
+        ("measurement", "opened"),
+        ("measurement", "closed"),
+    ]

@@ -55,9 +55,9 @@ def test_two_labels_of_one_class_on_one_box_do_not_contradict(tmp_path: Path) ->
 
 def test_paths_are_relative_to_the_file_and_may_hold_variables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     _flights(tmp_path / "sets" / "f")
-    monkeypatch.setenv("STANDOFF_TEST_SETS", str(tmp_path / "sets"))
+    monkeypatch.setenv("TEST_SETS", str(tmp_path / "sets"))
     monkeypatch.setenv("HOME", str(tmp_path))
-    for path in ("sets/f", "$STANDOFF_TEST_SETS/f", "${STANDOFF_TEST_SETS}/f", "~/sets/f"):
+    for path in ("sets/f", "$TEST_SETS/f", "${TEST_SETS}/f", "~/sets/f"):
         assert len(by_stem(read_data(write_mixture(tmp_path / "m.yaml", {"path": path})))) == 18
 
 

@@ -74,3 +74,8 @@ def main() -> None:
     except StandoffError as error:
         typer.echo(f"standoff: {error}", err=True)
         sys.exit(2)
+    except OSError as error:
+        # A full disk or a lost share, wherever it strikes: one line, and never the whole stack.
+        where = f" ({error.filename})" if error.filename else ""
+        typer.echo(f"standoff: {error.strerror or error}{where}", err=True)
+        sys.exit(1)

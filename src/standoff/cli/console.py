@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from standoff.core.errors import OutputError
-
 if TYPE_CHECKING:
     from rich.progress import Progress
 
@@ -28,14 +26,7 @@ def write_json(data: object, path: Path) -> None:
     if str(path) == "-":
         typer.echo(json_text(data), nl=False)
         return
-    try:
-        write_json_file(path, data)
-    except OSError as error:
-        raise OutputError(
-            expected=f"to write {path}",
-            found=error.strerror or str(error),
-            fix="choose a file in a folder that is writable",
-        ) from error
+    write_json_file(path, data)
 
 
 def print_table(

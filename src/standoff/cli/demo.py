@@ -35,7 +35,7 @@ def demo(
     from standoff.cli.demo_tables import print_scores
     from standoff.config import load_settings
     from standoff.evaluation.clip_run import ClipWitness, score_papers_method
-    from standoff.monitor import RECORD, open_run
+    from standoff.monitor import open_run
 
     quiet = str(json_file) == "-"
     clip = _load_film()
@@ -44,10 +44,10 @@ def demo(
     run = open_run(clip.video, out, settings, overwrite=overwrite)
     witness = ClipWitness(clip, settings, run.source.size_px)
     watch(run, quiet=quiet, on_result=witness.take)
-    tell(out / RECORD, as_json=False, quiet=quiet)
+    tell(run, as_json=False, quiet=quiet)
     if not witness.has_seen_all:
         typer.echo("The film was not seen to its end: no comparison with its truth.", err=True)
-        raise typer.Exit(exit_status(out / RECORD))
+        raise typer.Exit(exit_status(run))
     score = witness.score()
     with progress("the paper's method", clip.frame_count, quiet=quiet) as on_frame:
         paper = score_papers_method(clip, out, on_frame)
@@ -56,7 +56,7 @@ def demo(
     if not quiet:
         print_scores(score, paper)
         typer.echo(f"Open {out / 'report.html'} in a browser, and {out / 'annotated.mp4'} in a player.")
-    raise typer.Exit(exit_status(out / RECORD))
+    raise typer.Exit(exit_status(run))
 
 
 def _load_film() -> Clip:

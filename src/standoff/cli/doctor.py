@@ -14,6 +14,7 @@ _EXTRAS = {
     "train": ("torch", "onnx"),
     "sim": ("moderngl", "trimesh", "pycollada", "shapely", "mapbox-earcut"),
 }
+_IN_ITS_PLACE = {"onnxruntime": ("onnxruntime-gpu", "onnxruntime-openvino", "onnxruntime-directml")}
 _PROVIDERS = {
     "CPUExecutionProvider": "part of onnxruntime",
     "CUDAExecutionProvider": "pip install onnxruntime-gpu (in place of onnxruntime)",
@@ -47,7 +48,7 @@ def _packages() -> list[Finding]:
                 plain = plain.split(sign)[0]
             needed[plain.strip()] = name.strip()
     findings = [
-        Finding("package", name, _version(name), needed=True, fix=f"pip install '{requirement}'")
+        Finding("package", name, _any_version(name), needed=True, fix=f"pip install '{requirement}'")
         for name, requirement in needed.items()
     ]
     for extra, names in _EXTRAS.items():
@@ -63,6 +64,12 @@ def _version(distribution: str) -> str:
         return importlib.metadata.version(distribution)
     except importlib.metadata.PackageNotFoundError:
         return ""
+
+
+def _any_version(name: str) -> str:
+    """Return the version of a package, or of one that takes its place."""
+    found = [(other, _version(other)) for other in (name, *_IN_ITS_PLACE.get(name, ()))]
+    return next((version if other == name else f"{other} {version}" for other, version in found if version), "")
 
 
 def _opencv_clash() -> list[Finding]:
@@ -107,11 +114,14 @@ def _encoders() -> list[Finding]:
 
 def _opengl() -> list[Finding]:
     from standoff.core.errors import MissingDependency
-    from standoff.simulation.render.context import open_context
 
     found, fix = "", ""
     try:
+        from standoff.simulation.render.context import open_context
+
         context = open_context()
+    except ImportError:
+        fix = "pip install 'standoff[sim]'"
     except MissingDependency as error:
         fix = error.fix
     else:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import signal
 from collections.abc import Callable
 from contextlib import closing
@@ -164,7 +163,7 @@ def run(
 ) -> None:
     """Monitor a video: distances in metres, hazards, an annotated film and a report."""
     from standoff.config import load_settings
-    from standoff.monitor import RECORD, open_run, stage_warnings
+    from standoff.monitor import open_run, stage_warnings
 
     plain = {
         "telemetry": telemetry,
@@ -188,13 +187,13 @@ def run(
         watch(opened, quiet=quiet)
     except StandoffError:
         # Its own line says it all; only a machine still wants the record.
-        tell(out / RECORD, as_json=as_json, quiet=True)
+        tell(opened, as_json=as_json, quiet=True)
         raise
     for warning in stage_warnings(*stages):
         if warning not in known:
             typer.echo(f"standoff: warning: {warning}", err=True)
-    tell(out / RECORD, as_json=as_json, quiet=quiet)
-    raise typer.Exit(exit_status(out / RECORD))
+    tell(opened, as_json=as_json, quiet=quiet)
+    raise typer.Exit(exit_status(opened))
 
 
 class _StopRequest:
@@ -239,11 +238,11 @@ def watch(opened: Run, *, quiet: bool, on_result: Callable[[FrameResult], None] 
                 break
 
 
-def tell(record_file: Path, *, as_json: bool, quiet: bool) -> None:
+def tell(ended: Run, *, as_json: bool, quiet: bool) -> None:
     """Print the record, or a summary of it."""
     from standoff.cli.console import print_table, write_json
 
-    record = json.loads(record_file.read_text(encoding="utf-8"))
+    record = ended.record
     if as_json:
         write_json(record, Path("-"))
     elif not quiet:
@@ -258,14 +257,17 @@ def tell(record_file: Path, *, as_json: bool, quiet: bool) -> None:
         ]
         rows += [(f"no map: {reason}", f"{number}") for reason, number in counts["no_ground_map"].items()]
         rows += [(f"output {name} failed", message) for name, message in record["sink_errors"].items()]
-        print_table(f"{record['status']}: {record_file.parent}", ("", ""), rows, record["message"], texts=2)
+        print_table(f"{record['status']}: {ended.folder}", ("", ""), rows, record["message"], texts=2)
 
 
-def exit_status(record_file: Path) -> int:
+def exit_status(ended: Run) -> int:
     """Return 1 for a run that was interrupted, did not measure much that it saw, or lost an output."""
     from standoff.core.unfollowed import are_many
+    from standoff.monitor import RECORD
 
-    record = json.loads(record_file.read_text(encoding="utf-8"))
+    record, lost = ended.record, ended.pipeline.sink_errors
+    if "record" in lost:
+        typer.echo(f"standoff: {ended.folder / RECORD} could not be written whole: {lost['record']}", err=True)
     if record["status"] == "interrupted":
         typer.echo("standoff: interrupted; what was written up to then is whole.", err=True)
         return 1
@@ -276,4 +278,4 @@ def exit_status(record_file: Path) -> int:
     untracked = are_many(counts["unfollowed_detections"], counts["sure_detections"])
     if untracked:
         typer.echo("standoff: many sure detections are in no track; their distances are not known.", err=True)
-    return int(unmeasured or untracked or bool(record["sink_errors"]))
+    return int(unmeasured or untracked or bool(lost))

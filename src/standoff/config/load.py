@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import copy
+import os
 from collections.abc import Mapping
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Final
 
@@ -78,6 +80,21 @@ def _anchor_paths(settings: dict[str, Any], folder: Path) -> None:
             section[name] = str((folder / section[name]).resolve())
 
 
+def _check_environment() -> None:
+    """Raise ConfigError for a variable that looks like a setting and is none: it would be passed over."""
+    prefix = str(Settings.model_config.get("env_prefix", ""))
+    known = [f"{prefix}{name.upper()}" for name in Settings.model_fields]
+    for variable in os.environ:
+        section = variable.upper().partition("__")[0]
+        if section.startswith(prefix) and section not in known:
+            nearest = get_close_matches(section, known, n=1, cutoff=0.0)[0]
+            raise ConfigError(
+                expected=f"settings in variables that begin with {prefix}",
+                found=variable,
+                fix=f"unset it, or write {nearest}{variable[len(section) :]} if that is what is meant",
+            )
+
+
 def load_settings(path: Path | str | None = None, overrides: Mapping[str, Any] | None = None) -> Settings:
     """Read the settings file, the environment and the overrides into one checked tree.
 
@@ -88,6 +105,7 @@ def load_settings(path: Path | str | None = None, overrides: Mapping[str, Any] |
     Raises:
         ConfigError: A file that cannot be read, a name that does not exist, a value out of bounds.
     """
+    _check_environment()
     from_file: dict[str, Any] = {}
     if path is not None:
         path = Path(path)

@@ -38,7 +38,8 @@ def unfollowed(detections: Detections, tracks: Tracks, least_score: float = SURE
     sure = detections[(detections.score >= least_score) & (_ROLE[detections.class_id] != _REFERENCE)]
     same_role = _ROLE[sure.class_id][:, None] == _ROLE[tracks.class_id]
     followed = same_role & (overlaps(sure.xyxy_px, tracks.xyxy_px) >= _SAME_THING)
-    return ~followed.any(axis=1)
+    lost: BoolArray = ~followed.any(axis=1)
+    return lost
 
 
 def are_many(count: int, of: int) -> bool:

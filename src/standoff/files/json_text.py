@@ -6,6 +6,7 @@ import json
 import math
 import os
 from collections.abc import Mapping, Set
+from contextlib import suppress
 from dataclasses import asdict, is_dataclass
 from datetime import date
 from enum import Enum
@@ -14,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from standoff.core.errors import OutputError
 from standoff.files.whole import partial_path
 
 
@@ -59,10 +61,23 @@ def json_text(value: Any) -> str:  # noqa: ANN401
 
 
 def write_json(path: Path, value: Any) -> None:  # noqa: ANN401
-    """Write an indented JSON file that is, at any moment, either the old one or the new one."""
+    """Write an indented JSON file that is, at any moment, either the old one or the new one.
+
+    Raises:
+        OutputError: It cannot be written.
+    """
     partial = partial_path(path)
-    with partial.open("w", encoding="utf-8") as file:
-        file.write(json_text(value))
-        file.flush()
-        os.fsync(file.fileno())
-    partial.replace(path)
+    try:
+        with partial.open("w", encoding="utf-8") as file:
+            file.write(json_text(value))
+            file.flush()
+            os.fsync(file.fileno())
+        partial.replace(path)
+    except OSError as error:
+        with suppress(OSError):
+            partial.unlink(missing_ok=True)
+        raise OutputError(
+            expected=f"to write {path}",
+            found=error.strerror or str(error),
+            fix="make room, or choose a file in a folder that is writable",
+        ) from error

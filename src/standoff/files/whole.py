@@ -9,6 +9,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from standoff.core.errors import OutputError
+from standoff.files.in_use import in_use
 
 
 def partial_path(path: Path) -> Path:
@@ -53,7 +54,7 @@ def whole_folder(out: Path, *, overwrite: bool, own: Collection[str]) -> Generat
         own: Names of what a result may hold at its top. A folder with anything else is never replaced.
 
     Raises:
-        OutputError: `out` is a file, has files in it, is the current folder, or cannot be written.
+        OutputError: `out` is a file, has files in it, is the current folder, is just being written, or cannot be.
     """
     out = out.resolve()
     if out.exists() and not out.is_dir():
@@ -74,12 +75,15 @@ def whole_folder(out: Path, *, overwrite: bool, own: Collection[str]) -> Generat
         )
     staging, older = (out.parent / f".{out.name}.{end}" for end in ("partial", "older"))
     try:
-        shutil.rmtree(staging, ignore_errors=True)
+        if staging.exists():
+            with in_use(staging):
+                shutil.rmtree(staging, ignore_errors=True)
         staging.mkdir(parents=True)
     except OSError as error:
         raise _not_writable(out, error) from error
     try:
-        yield staging
+        with in_use(staging):
+            yield staging
         if out.exists():
             shutil.rmtree(older, ignore_errors=True)
             out.replace(older)

@@ -36,7 +36,8 @@ def view(ground: ImageArray, picture_to_soil: FloatArray, noise_seed: int = 0) -
     """What a camera sees of it."""
     gray = cv2.warpPerspective(ground, picture_to_soil, SIZE_PX, flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP)
     noisy = gray + np.random.default_rng(noise_seed).normal(0.0, 2.0, gray.shape)
-    return np.clip(noisy, 0, 255).astype(np.uint8)
+    seen: ImageArray = np.clip(noisy, 0, 255).astype(np.uint8)
+    return seen
 
 
 def shifted(x_px: float, y_px: float = 0.0, turn_rad: float = 0.0) -> FloatArray:

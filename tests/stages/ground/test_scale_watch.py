@@ -91,10 +91,14 @@ def test_the_reason_keeps_its_words_so_that_it_can_be_counted() -> None:
 @given(st.integers(1, 7), st.integers(1, 12))
 def test_few_sizes_or_a_single_person_never_take_the_map_away(boxes: int, frames: int) -> None:
     few = workers(_BOXES[:boxes])
-    _, result = watched(100.0, few, frames=1)
+    _, result = watched(8.0, few, frames=1)
     assert isinstance(result, GroundMap)
     _, result = watched(100.0, workers(_BOXES[:1]), frames=frames)
     assert isinstance(result, GroundMap)
+
+
+def test_what_no_clutter_could_be_takes_the_map_away_at_the_first_look() -> None:
+    assert isinstance(watched(100.0, workers(_BOXES[:4]), frames=1)[1], NoGroundMap)
 
 
 def test_it_looks_at_most_twice_a_second() -> None:
@@ -135,7 +139,6 @@ def test_machines_of_the_usual_size_speak_for_a_map_that_small_clutter_speaks_ag
         ("good", None),
         ("cm", "centimetres for metres"),
         ("mm", "millimetres for metres"),
-        ("degrees_lonlat", "too small"),
     ],
 )
 def test_a_survey_in_another_unit_is_named(shared_data: Path, name: str, told: str | None) -> None:

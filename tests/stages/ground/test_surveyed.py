@@ -8,6 +8,9 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from laws import examples
 from tolerances import GROUND_THROUGH_LENS_M, SURVEY_COVERAGE, SURVEY_SIGMA_REL
 
 from standoff.core import homography
@@ -16,6 +19,7 @@ from standoff.core.errors import GroundError
 from standoff.core.homography import FloatArray
 from standoff.core.types import Detections, Frame, GroundMap, ImageArray, Luma, NoCameraMotion, NoGroundMap
 from standoff.stages.frames.pictures import halved
+from standoff.stages.ground.geographic import east_north_m
 from standoff.stages.ground.survey_file import load_survey
 from standoff.stages.ground.surveyed import SurveyedGround
 
@@ -332,6 +336,46 @@ def test_a_survey_files_camera_is_found_beside_it_and_can_be_replaced(tmp_path: 
     assert replaced.distortion[0] == -0.25
 
 
+def geographic_survey(key: str, offset_deg: tuple[float, float], span_deg: float) -> str:
+    """Write the four points as degrees."""
+    rows = [
+        f"  - {{px: [{x}, {y}], {key}: [{offset_deg[0] + span_deg * a:.9f}, {offset_deg[1] + span_deg * b:.9f}]}}"
+        for x, y, a, b in ((100, 100, 0, 3), (500, 100, 4, 3), (500, 400, 4, 0), (100, 400, 0, 0))
+    ]
+    return "image_size_px: [1280, 720]\npoints:\n" + "\n".join(rows) + "\n"
+
+
+@given(longitude=st.floats(-180, 180), latitude=st.floats(-75, 75))
+@examples(30)
+def test_degrees_become_metres_as_the_ellipsoid_says(longitude: float, latitude: float) -> None:
+    found_m = east_north_m(np.array([[longitude, latitude], [longitude + 0.002, latitude + 0.001]]))
+    # From the ellipsoid in space: the chord between the two places.
+    places = []
+    for lon, lat in ((longitude, latitude), (longitude + 0.002, latitude + 0.001)):
+        east, north = np.deg2rad([lon, lat])
+        radius_m = 6378137.0 / np.sqrt(1 - 0.00669437999014 * np.sin(north) ** 2)
+        places.append(
+            radius_m
+            * np.array(
+                [np.cos(north) * np.cos(east), np.cos(north) * np.sin(east), (1 - 0.00669437999014) * np.sin(north)]
+            )
+        )
+    assert np.linalg.norm(found_m[1] - found_m[0]) == pytest.approx(np.linalg.norm(places[1] - places[0]), rel=2e-6)
+
+
+@pytest.mark.parametrize("offset_deg", [(8.5, 50.1), (-81.196, 28.605), (0.0, 0.0), (28.605, -81.196)])
+def test_degrees_that_are_said_to_be_metres_are_refused(tmp_path: Path, offset_deg: tuple[float, float]) -> None:
+    with pytest.raises(GroundError, match="probably degrees"):
+        load_survey(survey_file(tmp_path, geographic_survey("m", offset_deg, 1e-4)))
+
+
+def test_a_survey_in_degrees_gives_metres(tmp_path: Path) -> None:
+    ground = load_survey(survey_file(tmp_path, geographic_survey("lonlat", (8.5, 50.1), 1e-4)))
+    places_m, _ = updated(ground).to_ground(np.array([[100.0, 400.0], [500.0, 400.0], [100.0, 100.0]]))
+    east_m, north_m = places_m[1] - places_m[0], places_m[2] - places_m[0]
+    np.testing.assert_allclose([east_m, north_m], [[28.61, 0.0], [0.0, 33.37]], atol=0.01)
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -341,7 +385,12 @@ def test_a_survey_files_camera_is_found_beside_it_and_can_be_replaced(tmp_path: 
         (_SURVEY.replace("[100, 100]", "[100]"), "2 numbers for px of 'kerb'"),
         (_SURVEY.replace("m: [0, 3]", "m: [0, .nan]"), "finite numbers for m of 'kerb'"),
         (_SURVEY.replace(", m: [0, 3]", ""), "2 numbers for m of 'kerb'"),
-        (_SURVEY.replace("m: [0, 3]", "metres: [0, 3]"), "only the keys m, name, px"),
+        (_SURVEY.replace("m: [0, 3]", "metres: [0, 3]"), "only the keys lonlat, m, name, px"),
+        (_SURVEY.replace("m: [0, 3]", "lonlat: [8.1, 50.2]"), "points in m or in lonlat"),
+        (
+            _SURVEY.replace("m: [0, ", "lonlat: [8, 9").replace("m: [4, ", "lonlat: [8, 9"),
+            "degrees [longitude, latitude]",
+        ),
         (_SURVEY.replace("manhole", "kerb"), "'kerb' twice"),
         (_SURVEY.rsplit("  -", 1)[0], "four or more points, each with px and m, found 3"),
         ("image_size_px: [1280, 720]\npoints: none\n", "a list of points"),

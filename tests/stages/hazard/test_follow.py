@@ -12,7 +12,8 @@ GROUND = GroundMap(np.eye(3), np.zeros((9, 9)), (1920, 1080), "exact", 0.02)
 
 def events_of(shares: list[float], step_s: float) -> tuple[list[Hazard], HazardMonitor]:
     """Run a monitor over frames of ten sure detections, of which a share is in no track."""
-    monitor, events = HazardMonitor(), []
+    monitor = HazardMonitor()
+    events: list[Hazard] = []
     for index, share in enumerate(shares):
         lost = np.arange(10) < round(10 * share)
         events += monitor.update(step_s * index, GroundPositions.empty(), Proximities.empty(), GROUND, lost)

@@ -79,7 +79,7 @@ def test_untrusted_positions_add_nothing_and_ended_tracks_are_forgotten() -> Non
 
 @given(velocity=st.tuples(COORDINATES, COORDINATES), gap_s=st.floats(0.6, 30.0))
 def test_a_film_of_few_frames_has_velocities_too(velocity: tuple[float, float], gap_s: float) -> None:
-    times_s = gap_s * np.arange(6)
+    times_s: FloatArray = gap_s * np.arange(6.0)
     path_m = times_s[:, None] * np.array(velocity)
     assert np.isnan(velocity_after(times_s[:2], path_m[:2])).all()
     found = velocity_after(times_s, path_m)

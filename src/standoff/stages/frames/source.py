@@ -8,6 +8,7 @@ reader.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator
 from datetime import timedelta
 from itertools import chain
@@ -24,6 +25,9 @@ from standoff.stages.frames.pictures import ArrayPicture
 from standoff.stages.frames.reader import TIME_ROUNDING_S, Reader, Shot
 from standoff.stages.frames.telemetry_choice import TelemetryChoice, choose_telemetry
 from standoff.stages.frames.video import VideoReader
+
+_ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:/")
+"""A scheme has two letters or more; a drive has one. A path has lost the second slash."""
 
 
 class Selection(NamedTuple):
@@ -218,6 +222,12 @@ def open_source(
     selection.check()
     if fps is not None and not (math.isfinite(fps) and fps > 0):
         raise SourceError(expected="more than 0 pictures a second", found=str(fps), fix="give fps as a positive number")
+    if _ADDRESS.match(str(path)):
+        raise SourceError(
+            expected="a video file or a folder of images",
+            found=f"the address of a stream, {path}",
+            fix="record the stream to a file first; streams are not read yet",
+        )
     if not path.exists():
         raise SourceError(
             expected="a video file or a folder of images", found=f"nothing at {path}", fix="check the path"

@@ -21,6 +21,9 @@ _MOST_SIZES = 120
 """Of people, and of machines: what was seen last counts."""
 
 _FEWEST_ENTITIES, _FEWEST_TO_WARN, _FEWEST_TO_REFUSE = 2, 3, 8
+_ABSURD_FACTOR = 10.0
+"""Beyond it no clutter is: as many as are enough to warn are enough to refuse."""
+
 _AGREED_SHARE = 0.75
 """So many of the sizes must be off by a factor, in one direction: some clutter passes for people, never so much."""
 
@@ -116,7 +119,8 @@ class ScaleWatch:
         enough = at_once >= _FEWEST_ENTITIES
         if enough and seen >= _FEWEST_TO_WARN and abs(log_factor) >= max(np.log(WARNING_FACTOR), self._worst_log):
             self._worst_log, self._warning = abs(log_factor), self._clause()
-        if not (enough and seen >= _FEWEST_TO_REFUSE and abs(log_factor) >= np.log(REFUSAL_FACTOR)):
+        fewest = _FEWEST_TO_WARN if abs(log_factor) >= np.log(_ABSURD_FACTOR) else _FEWEST_TO_REFUSE
+        if not (enough and seen >= fewest and abs(log_factor) >= np.log(REFUSAL_FACTOR)):
             self._refusal = ""
         elif not self._refusal:
             # The words stay the same as long as the cause does, so that it can be counted.

@@ -10,6 +10,9 @@
     point_sigma_px: 1.0                # optional: how well a point was read, one coordinate
     time_s: 0.0                        # where the camera moves: when the picture was taken, by the film's clock
 
+A point has either `m`, or `lonlat: [8.543210, 50.123456]`: degrees of longitude and latitude (WGS 84), which become
+metres east and north of the first point.
+
 Pixels: the centre of the top-left pixel is (0, 0), x right, y down. Metres: x east, y north, or any other
 right-handed axes seen from above. Names are optional and only serve messages.
 """
@@ -24,7 +27,9 @@ import numpy as np
 
 from standoff.core.camera import Camera
 from standoff.core.errors import GroundError
+from standoff.core.homography import FloatArray
 from standoff.stages.ground.camera_file import load_camera
+from standoff.stages.ground.geographic import east_north_m, look_like_degrees
 from standoff.stages.ground.surveyed import SurveyedGround
 from standoff.stages.ground.yaml_file import check_keys, numbers, parse_mapping, read_text
 
@@ -59,7 +64,7 @@ def load_survey(path: Path | str, *, camera: Camera | None = None) -> SurveyedGr
     sigma_px = numbers(content.get("point_sigma_px", 1.0), (), f"point_sigma_px in {path}")
     return SurveyedGround(
         [numbers(point.get("px"), (2,), f"px of {name!r} in {path}") for name, point in points.items()],
-        [numbers(point.get("m"), (2,), f"m of {name!r} in {path}") for name, point in points.items()],
+        _points_m(points, path),
         (int(width_px), int(height_px)),
         names=tuple(points),
         camera=camera,
@@ -67,6 +72,30 @@ def load_survey(path: Path | str, *, camera: Camera | None = None) -> SurveyedGr
         point_sigma_px=float(sigma_px),
         time_s=None if time_s is None else float(numbers(time_s, (), f"time_s in {path}")),
     )
+
+
+def _points_m(points: Mapping[str, Mapping[str, Any]], path: Path) -> FloatArray:
+    units = {unit for point in points.values() for unit in ("m", "lonlat") if unit in point}
+    if len(units) > 1:
+        fix = "write all points in one of them"
+        raise GroundError(expected="points in m or in lonlat", found=f"both in {path}", fix=fix)
+    unit = units.pop() if units else "m"
+    rows = [numbers(point.get(unit), (2,), f"{unit} of {name!r} in {path}") for name, point in points.items()]
+    places = np.array(rows, dtype=np.float64).reshape(-1, 2)
+    if unit == "lonlat":
+        outside = (np.abs(places) > np.array([180.0, 90.0])).any(axis=1)
+        if outside.any():
+            found = f"{places[outside][0].tolist()} in {path}"
+            raise GroundError(expected="degrees [longitude, latitude]", found=found, fix="correct lonlat")
+        return east_north_m(places) if len(places) else places
+    if len(places) > 1 and look_like_degrees(places):
+        span_m = np.ptp(places, axis=0).max()
+        raise GroundError(
+            expected="m in metres",
+            found=f"points that all lie within {span_m:.2g} m in {path}, probably degrees of longitude and latitude",
+            fix="write lonlat: [longitude, latitude] in place of m",
+        )
+    return places
 
 
 def _points(content: Mapping[str, Any], path: Path) -> dict[str, Mapping[str, Any]]:
@@ -77,7 +106,7 @@ def _points(content: Mapping[str, Any], path: Path) -> dict[str, Mapping[str, An
     points: dict[str, Mapping[str, Any]] = {}
     for number, row in enumerate(rows, start=1):
         name = str(row.get("name", f"point {number}"))
-        check_keys(row, ("name", "px", "m"), f"{name!r} in {path}")
+        check_keys(row, ("name", "px", "m", "lonlat"), f"{name!r} in {path}")
         if name in points:
             raise GroundError(expected="distinct names", found=f"{name!r} twice in {path}", fix="rename one")
         points[name] = row

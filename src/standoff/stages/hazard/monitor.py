@@ -72,7 +72,9 @@ class HazardMonitor:
 
     def __init__(self, params: HazardParams | None = None) -> None:
         self._params = params or HazardParams()
-        self.reset()
+        self._map = MapWatch(self._params)
+        self._follow = FollowWatch(self._params)
+        self._pairs: dict[Pair, PairWatch] = {}
 
     @property
     def description(self) -> dict[str, list[str]]:
@@ -124,7 +126,7 @@ class HazardMonitor:
         """Forget everything without a word."""
         self._map = MapWatch(self._params)
         self._follow = FollowWatch(self._params)
-        self._pairs: dict[Pair, PairWatch] = {}
+        self._pairs = {}
 
 
 def _readings(proximities: Proximities) -> dict[Pair, Reading]:

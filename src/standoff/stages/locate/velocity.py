@@ -44,7 +44,8 @@ class VelocityEstimator:
     def __init__(self, window_s: float, min_span_s: float) -> None:
         self._window_s = window_s
         self._min_span_s = min_span_s
-        self.reset()
+        self._trails: dict[int, deque[tuple[float, float, float]]] = {}
+        self._looks_s: deque[float] = deque(maxlen=_MIN_POINTS)
 
     def update(
         self, time_s: float, track_id: IntArray, xy_m: FloatArray, observed: BoolArray, trusted: BoolArray
@@ -79,5 +80,5 @@ class VelocityEstimator:
 
     def reset(self) -> None:
         """Forget all tracks."""
-        self._trails: dict[int, deque[tuple[float, float, float]]] = {}
-        self._looks_s: deque[float] = deque(maxlen=_MIN_POINTS)
+        self._trails = {}
+        self._looks_s.clear()

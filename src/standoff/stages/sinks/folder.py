@@ -7,6 +7,7 @@ import tempfile
 from pathlib import Path
 
 from standoff.core.errors import OutputError
+from standoff.files.in_use import in_use
 from standoff.files.whole import partial_path
 
 OUTPUT_FILES: tuple[str, ...] = (
@@ -49,7 +50,7 @@ def prepare_output(path: Path | str, *, overwrite: bool = False) -> Path:
         The folder.
 
     Raises:
-        OutputError: It is a file, cannot be created or written to, or already holds a run.
+        OutputError: It is a file, cannot be created or written to, already holds a run, or one is going on in it.
     """
     folder = Path(path)
     if folder.exists() and not folder.is_dir():
@@ -71,8 +72,9 @@ def prepare_output(path: Path | str, *, overwrite: bool = False) -> Path:
             found=f"{', '.join(trace.name for trace in earlier)} in {folder}",
             fix="choose another folder or pass --overwrite",
         )
-    for trace in earlier:
-        _remove(trace)
+    with in_use(folder):
+        for trace in earlier:
+            _remove(trace)
     return folder
 
 

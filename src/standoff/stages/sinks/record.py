@@ -6,6 +6,7 @@ import platform
 import time
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -14,8 +15,9 @@ from typing import Any
 import numpy as np
 
 from standoff import __version__
+from standoff.core.errors import OutputError
 from standoff.core.types import FrameResult, GroundMap, Hazard, NoGroundMap, Outcome, Severity
-from standoff.files.json_text import write_json
+from standoff.files.json_text import json_text, plain, write_json
 from standoff.stages.sinks.durations import Durations
 from standoff.stages.sinks.scene import worse
 
@@ -49,6 +51,12 @@ class RecordSink:
         descriptions: What only the caller knows (resolved configuration, source, model, ground), kept as
             given; what JSON has no word for becomes text, and a number that is not finite null.
         at_close: Gives those anew that are only known after the last frame; None: nothing is.
+
+    Attributes:
+        record: What the file says, or should say where it could not be written.
+
+    Raises:
+        OutputError: The file cannot be written.
     """
 
     def __init__(
@@ -69,7 +77,8 @@ class RecordSink:
         self._live_tracks: set[int] = set()
         self._live_pairs: set[tuple[int, int]] = set()
         self._stages: defaultdict[str, Durations] = defaultdict(Durations)
-        write_json(self._path, {"status": "running", "message": "", **self._head})
+        self.record: dict[str, Any] = {"status": "running", "message": "", **self._head}
+        write_json(self._path, self.record)
 
     def write(self, result: FrameResult) -> None:
         """Count this frame."""
@@ -114,28 +123,46 @@ class RecordSink:
         self._live_tracks, self._live_pairs = tracks, live_pairs
 
     def close(self, outcome: Outcome) -> None:
-        """Write the final record."""
+        """Write the final record; where there is no room for it, at least how the run ended.
+
+        Raises:
+            OutputError: The whole record could not be written.
+        """
         self._count_hazards(outcome.hazards)
         wall_s = time.monotonic() - self._started
-        record = {
-            "status": outcome.status,
-            "message": outcome.message,
-            **self._head,
-            **(self._at_close() if self._at_close is not None else {}),
-            "finished_at": datetime.now(UTC),
-            "wall_s": round(wall_s, 3),
-            "frames_per_s": round(self._counts["frames"] / wall_s, 2) if wall_s > 0 else None,
-            "counts": {
-                **self._counts,
-                "hazards": Counter(self._hazard_severity.values()),
-                "map_methods": self._map_methods,
-                "no_ground_map": self._no_map,
-                "invalid_positions": self._invalid,
-            },
-            "stages": {stage: durations.summary() for stage, durations in self._stages.items()},
-            "sink_errors": outcome.sink_errors,
-        }
-        write_json(self._path, record)
+        self.record = plain(
+            {
+                "status": outcome.status,
+                "message": outcome.message,
+                **self._head,
+                **(self._at_close() if self._at_close is not None else {}),
+                "finished_at": datetime.now(UTC),
+                "wall_s": round(wall_s, 3),
+                "frames_per_s": round(self._counts["frames"] / wall_s, 2) if wall_s > 0 else None,
+                "counts": {
+                    **self._counts,
+                    "hazards": Counter(self._hazard_severity.values()),
+                    "map_methods": self._map_methods,
+                    "no_ground_map": self._no_map,
+                    "invalid_positions": self._invalid,
+                },
+                "stages": {stage: durations.summary() for stage, durations in self._stages.items()},
+                "sink_errors": outcome.sink_errors,
+            }
+        )
+        try:
+            write_json(self._path, self.record)
+        except OutputError as error:
+            message = f"{outcome.message or 'the run came to its end'}; this record is not whole: {error.found}"
+            _write_over(self._path, {"status": "failed", "message": message, "sink_errors": outcome.sink_errors})
+            raise
+
+
+def _write_over(path: Path, short: Mapping[str, Any]) -> None:
+    """Put something short in the place of a longer text, which takes no room that is not there."""
+    with suppress(OSError), path.open("r+", encoding="utf-8") as file:
+        file.write(json_text(short))
+        file.truncate()
 
 
 def library_versions() -> dict[str, str]:

@@ -38,7 +38,7 @@ def standing_m(detections: Detections, ground: GroundMap | NoGroundMap) -> Float
     if isinstance(ground, NoGroundMap) or not len(detections):
         return np.full((len(detections), 2), np.nan)
     left, _, right, bottom = detections.xyxy_px.T
-    known = np.isfinite(detections.foot_px).all(axis=1)
+    known = np.asarray(np.isfinite(detections.foot_px).all(axis=1))
     at_px = np.where(known[:, None], detections.foot_px, np.column_stack([(left + right) / 2.0, bottom]))
     places_m, _ = ground.to_ground(at_px)
     return places_m

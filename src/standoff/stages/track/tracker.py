@@ -209,13 +209,15 @@ class Tracker:
         class_id = self._class_id(self._rows)
         closeness = reach.closeness(self._rows, class_id, places_m, ground, self._time_s, self._params)
         just_seen: BoolArray = self._rows["seen_s"] == self._looked_s
-        return self._agreement(detections) * closeness * just_seen[:, None]
+        likeness: FloatArray = self._agreement(detections) * closeness * just_seen[:, None]
+        return likeness
 
     def _agreement(self, detections: Detections) -> FloatArray:
         """Return (M, N) how well classes agree."""
         class_id = self._class_id(self._rows)[:, None]
         agreement: FloatArray = np.where(class_id == detections.class_id, 1.0, _OTHER_CLASS)
-        return agreement * (_ROLE[class_id] == _ROLE[detections.class_id])
+        agreement *= _ROLE[class_id] == _ROLE[detections.class_id]
+        return agreement
 
     def _continue(self, which: IntArray, detections: Detections, by: IntArray) -> None:
         """Take detections `by` (K,) into tracks `which` (K,)."""

@@ -10,6 +10,7 @@ from typing import Any, Final
 
 from standoff.core.errors import ConfigError, ModelError
 from standoff.evaluation.detection import DetectionScore
+from standoff.files.in_use import FolderInUse
 from standoff.labels import LabelledData, Problem
 from standoff.labels.summary import summarise
 from standoff.stages.detect.model_card import file_sha256
@@ -94,6 +95,7 @@ def train_on(data: LabelledData, plan: RunPlan, out: Path, listener: Listener, *
     folder = RunFolder(out, data.classes)
     start = _resumed(folder, plan) if resumes else _started(plan, data, folder, listener, leads=leads)
     backbone_layers = plan.params.backbone_layers or start.backbone_layers
+    mark = FolderInUse(out) if leads else None
     trainer = Trainer(start.network, data, plan.params, folder.checkpoints, backbone_layers, folded=start.folded)
     if resumes:
         for name in trainer.resume():
@@ -115,6 +117,8 @@ def train_on(data: LabelledData, plan: RunPlan, out: Path, listener: Listener, *
     unreadable.sum_up()
     if leads:
         _write_results(plan, data, folder, progress, listener)
+    if mark is not None:
+        mark.release()
     return progress
 
 
