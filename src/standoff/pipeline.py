@@ -149,5 +149,6 @@ class Pipeline:
                 self._give_up(name, error)
 
     def _give_up(self, name: str, error: Exception) -> None:
-        _LOG.error("output %s stopped: %s", name, error)
+        if name not in self.sink_errors:
+            _LOG.error("output %s stopped: %s", name, error)
         self.sink_errors.setdefault(name, str(error) or type(error).__name__)

@@ -187,6 +187,9 @@ def test_files_that_are_no_videos_are_named_in_one_line(tmp_path: Path) -> None:
         "archive.zip": "which no reader recognises",
         "missing.mp4": "found nothing at",
     }
+    for address in ("rtsp://10.0.0.7:554/live", "rtmp://relay/drone", "https://site/film.mp4"):
+        with pytest.raises(SourceError, match="address of a stream"):
+            open_source(address)
     for name, found in expected.items():
         with pytest.raises(SourceError, match=found) as caught:
             open_source(tmp_path / name)
