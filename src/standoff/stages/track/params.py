@@ -56,10 +56,12 @@ class TrackParams:
         Ge(1),
         Doc("Detections in a row before a track is reported; those of a stream's first frame are reported at once."),
     ] = 2
-    confirm_within_s: Annotated[
+    rare_look_s: Annotated[
         float,
         Ge(0),
-        Doc("Where the detector's last look was longer ago, a new track is reported at first sight."),
+        Doc(
+            "Where the last look was longer ago, tracks go on over the ground, and new ones are reported at first sight."
+        ),
     ] = 0.25
     person_speed_mps: Annotated[
         float,

@@ -155,6 +155,10 @@ class Tracker:
                 carry(self._rows, step, motion.camera)
         self._time_s, self._motion = time_s, motion
 
+    @property
+    def _looks_are_rare(self) -> bool:
+        return self._time_s - self._looked_s > self._params.rare_look_s
+
     def _relevant(self, detections: Detections) -> Detections:
         """Drop reference objects, hopeless scores, and a machine's second box under another class."""
         surest_first = np.argsort(-detections.score, kind="stable")
@@ -208,7 +212,7 @@ class Tracker:
         """Return (M, N) closeness on the ground of the tracks that the last look saw; 0 for another role."""
         class_id = self._class_id(self._rows)
         closeness = reach.closeness(self._rows, class_id, places_m, ground, self._time_s, self._params)
-        just_seen: BoolArray = self._rows["seen_s"] == self._looked_s
+        just_seen: BoolArray = (self._rows["seen_s"] == self._looked_s) & self._looks_are_rare
         likeness: FloatArray = self._agreement(detections) * closeness * just_seen[:, None]
         return likeness
 
@@ -253,8 +257,7 @@ class Tracker:
         rows["class_votes"][np.arange(count), detections.class_id] = detections.score
         rows["hits"] = 1
         # Where looks are rare, a second one would come too late.
-        waits_s = self._time_s - self._looked_s
-        rows["confirmed"] = waits_s > self._params.confirm_within_s or self._params.confirm_hits == 1
+        rows["confirmed"] = self._looks_are_rare or self._params.confirm_hits == 1
         rows["started_s"] = rows["seen_s"] = rows["sure_s"] = self._time_s
         self._next_id += count
         self._rows = np.concatenate([self._rows, rows])
