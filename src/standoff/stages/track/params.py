@@ -59,9 +59,7 @@ class TrackParams:
     rare_look_s: Annotated[
         float,
         Ge(0),
-        Doc(
-            "Where the last look was longer ago, tracks go on over the ground, and new ones are reported at first sight."
-        ),
+        Doc("Where the last look was longer ago, tracks go on over the ground, and a new one is reported at once."),
     ] = 0.25
     person_speed_mps: Annotated[
         float,
