@@ -109,7 +109,7 @@ def open_run(source: Path | str, out: Path | str, settings: Settings, *, overwri
 def _known_so_far(source: Source, pipeline: Pipeline) -> dict[str, Any]:
     return {
         "ground": getattr(pipeline.ground, "description", None),
-        "warnings": [*source.warnings, *stage_warnings(pipeline.motion, pipeline.ground)],
+        "warnings": [*source.warnings, *stage_warnings(pipeline.detector, pipeline.motion, pipeline.ground)],
     }
 
 

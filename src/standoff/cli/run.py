@@ -180,7 +180,7 @@ def run(
     if ground_overrides := _ground_overrides(ground, reference_box, camera):
         overrides["ground"] = ground_overrides
     opened = open_run(source, out, load_settings(config, overrides), overwrite=overwrite)
-    stages = opened.pipeline.motion, opened.pipeline.ground
+    stages = opened.pipeline.detector, opened.pipeline.motion, opened.pipeline.ground
     known = stage_warnings(*stages)
     for warning in (*opened.source.warnings, *known):
         typer.echo(f"standoff: warning: {warning}", err=True)

@@ -13,6 +13,7 @@ from typing import Final, Literal, cast, get_args
 
 from standoff.core.errors import ModelError
 from standoff.files.lfs import refuse_pointer
+from standoff.files.utf8_text import read_utf8, refuse_no_text
 
 Activation = Literal["linear", "leaky", "logistic", "relu", "relu6", "mish", "swish"]
 
@@ -46,8 +47,6 @@ _TRAINING_OPTIONS: Final = frozenset(
     }
 )
 """They steer training or Darknet's own post-processing; the network computes the same without them."""
-
-_UTF16_MARKS: Final = (b"\xff\xfe", b"\xfe\xff")
 
 
 @dataclass(slots=True)
@@ -206,7 +205,15 @@ def read_cfg_text(path: Path) -> str:
     Raises:
         ModelError: It cannot be read.
     """
-    content = _content(path, "a Darknet cfg file")
+    what = f"a Darknet cfg file at {path}"
+    refuse_pointer(path, what, ModelError)
+    try:
+        content = path.read_bytes()
+        refuse_no_text(content)
+    except OSError as error:
+        raise _unreadable(what, error) from error
+    except ValueError as error:
+        raise ModelError(expected=what, found=str(error), fix="save the file as UTF-8, or check the path") from error
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -220,29 +227,15 @@ def read_names_text(path: Path) -> str:
     Raises:
         ModelError: It cannot be read; names the encoding where it is not UTF-8.
     """
-    content = _content(path, "a names file")
+    what = f"a names file in UTF-8 at {path}"
+    refuse_pointer(path, what, ModelError)
     try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = content.count(b"\n", 0, error.start) + 1
-        raise ModelError(
-            expected=f"UTF-8 in the names file {path}",
-            found=f"byte 0x{content[error.start]:02X} in line {line}, which is "
-            f"'{content[error.start : error.start + 1].decode('cp1252', 'replace')}' in Windows-1252",
-            fix="save the file as UTF-8",
-        ) from error
-
-
-def _content(path: Path, what: str) -> bytes:
-    refuse_pointer(path, f"{what} at {path}", ModelError)
-    try:
-        content = path.read_bytes()
+        return read_utf8(path)
     except OSError as error:
-        raise ModelError(
-            expected=f"{what} at {path}", found=error.strerror or type(error).__name__, fix="check the path"
-        ) from error
-    if content.startswith(_UTF16_MARKS):
-        raise ModelError(expected=f"{what} in UTF-8 at {path}", found="UTF-16", fix="save the file as UTF-8")
-    if b"\0" in content:
-        raise ModelError(expected=f"{what} at {path}", found="bytes that are not text", fix="check the path")
-    return content
+        raise _unreadable(what, error) from error
+    except ValueError as error:
+        raise ModelError(expected=what, found=str(error), fix="save the file as UTF-8") from error
+
+
+def _unreadable(what: str, error: OSError) -> ModelError:
+    return ModelError(expected=what, found=error.strerror or type(error).__name__, fix="check the path")
