@@ -18,6 +18,9 @@ _NAMES_OF_BOXES: Final = ("box", "det")
 _LARGEST_PROBABILITY: Final = 1.05
 """8-bit networks may round 1 up by a step."""
 
+_ROUNDING_PX: Final = 1.0
+"""Of corners in half precision, at 1920 px."""
+
 LARGEST_PART: Final = 10.0
 """Boxes as parts of the input may reach beyond it, but not by this much; boxes in pixels do."""
 
@@ -71,10 +74,16 @@ def check_candidates(found: Candidates) -> None:
     """Refuse what cannot be boxes and probabilities.
 
     Raises:
-        UnreadableOutputs: There is NaN, or a probability below 0 or above 1.
+        UnreadableOutputs: There is NaN, a box that ends before it begins, or a probability below 0 or above 1.
     """
     if np.isnan(found.xyxy_px).any():
         raise UnreadableOutputs("numbers", "NaN")
+    with np.errstate(invalid="ignore"):  # infinite less infinite; an infinite box ends where the picture does
+        sizes_px = found.xyxy_px[:, 2:] - found.xyxy_px[:, :2]
+    if (inverted := (sizes_px < -_ROUNDING_PX).any(axis=1)).any():
+        width_px, height_px = sizes_px[inverted][0]
+        expected = "boxes whose right lies right of their left, and bottom below top,"
+        raise UnreadableOutputs(expected, f"one of {width_px:.3g}x{height_px:.3g}")
     check_probability(found.probability)
 
 

@@ -144,7 +144,8 @@ class OnnxDetector:
         class_id = np.array(list(self._columns), dtype=np.int64)[best]
         xyxy_px = letterbox.to_source(candidates.xyxy_px)
         wanted = (score >= self._thresholds[class_id]) & (xyxy_px[:, 2:] > xyxy_px[:, :2]).all(axis=1)
-        found = Detections(xyxy_px, score, class_id, *feet_of(candidates, letterbox))[wanted]
+        values = xyxy_px, score, class_id, *feet_of(candidates, letterbox)
+        found = Detections(*(value[wanted] for value in values))
         return suppress(found, self._iou_in_view, self._params.max_detections)
 
 

@@ -26,9 +26,8 @@ from standoff.stages.detect.candidates import (
 from standoff.stages.detect.interface import Interface
 
 _BOX: Final = 4
-_ROUNDING_PX: Final = 1.0
-"""Of corners in half precision, at 1920 px."""
 _LEAST_BOX_PX: Final = 2.0
+"""What ends before this is no thing in the corner of the picture, but a box as parts of the input."""
 
 
 def more_columns(interface: Interface, trial: Mapping[str, Output]) -> int:
@@ -116,7 +115,8 @@ def ends_reader(interface: Interface, trial: Mapping[str, Output]) -> OutputRead
             found = _upright(rows, probability, scale, interface)
         else:
             found = Candidates(rows[:, :_BOX].astype(np.float64) * scale, probability)
-        _check_corners(found.xyxy_px, is_sure_of_unit)
+        if not is_sure_of_unit and len(rows) and np.abs(found.xyxy_px).max() <= _LEAST_BOX_PX:
+            raise UnreadableOutputs("boxes in pixels of the input", f"none beyond {np.abs(found.xyxy_px).max():.3g}")
         return found
 
     read([trial[name]], 0.0)
@@ -162,12 +162,3 @@ def _upright(rows: Output, probability: Output, scale: FloatArray, interface: In
         cosine, sine = (np.abs(turn(rows[:, -1].astype(np.float64))) for turn in (np.cos, np.sin))
         size = np.stack([size[:, 0] * cosine + size[:, 1] * sine, size[:, 0] * sine + size[:, 1] * cosine], axis=1)
     return candidates_from_centres(centre, size, probability)
-
-
-def _check_corners(xyxy_px: FloatArray, is_sure_of_unit: bool) -> None:
-    if not len(xyxy_px):
-        return
-    if (xyxy_px[:, 2:] < xyxy_px[:, :2] - _ROUNDING_PX).any():
-        raise UnreadableOutputs("corners, left, top, right, bottom,", "right or bottom before left or top")
-    if not is_sure_of_unit and np.abs(xyxy_px).max() <= _LEAST_BOX_PX:
-        raise UnreadableOutputs("boxes in pixels of the input", f"none beyond {np.abs(xyxy_px).max():.3g}")

@@ -36,6 +36,9 @@ _ZIP: Final = b"PK\x03\x04"
 """So begin PyTorch's checkpoints."""
 _TORCH_SUFFIXES: Final = (".pt", ".pth")
 _DARKNET_SUFFIX: Final = ".weights"
+# Its telemetry too where somebody else loaded it first, and of what it has to say only errors.
+onnxruntime.disable_telemetry_events()
+onnxruntime.set_default_logger_severity(_ERRORS_ONLY)
 ONNX_ERRORS: Final = (
     runtime_errors.EPFail,
     runtime_errors.Fail,
