@@ -386,6 +386,17 @@ def test_what_is_known_not_to_be_onnx_is_named(tmp_path: Path, content: bytes, n
         OnnxDetector(tmp_path / name)
 
 
+@pytest.mark.parametrize(("word", "instead"), [(b"images", b"im\xffges"), (b"person", b"p\xffrson")])
+def test_a_name_that_is_no_text_is_refused_in_one_line(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], word: bytes, instead: bytes
+) -> None:
+    model = _save(tmp_path / "m.onnx", _rows_of(7, 84).transpose(0, 2, 1), (64, 64))
+    model.write_bytes(model.read_bytes().replace(word, instead))
+    with pytest.raises(ModelError, match="names or metadata in it that are not UTF-8"):
+        OnnxDetector(model)
+    assert capfd.readouterr() == ("", "")
+
+
 _WHOLE = {
     "names": str(dict(enumerate(NAMES))),
     "imgsz": "[64, 96]",

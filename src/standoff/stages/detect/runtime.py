@@ -98,6 +98,17 @@ def _refuse_others(path: Path) -> None:
         raise ModelError(expected=expected, found="weights of Darknet", fix=fix)
 
 
+def _read_all_names(session: onnxruntime.InferenceSession) -> None:
+    """Read what ONNX Runtime decodes only when it is asked for.
+
+    Raises:
+        UnicodeDecodeError: It is damaged.
+    """
+    session.get_modelmeta().custom_metadata_map  # noqa: B018
+    for node in (*session.get_inputs(), *session.get_outputs()):
+        node.name, node.shape, node.type  # noqa: B018
+
+
 def told_by_runtime(error: Exception) -> str:
     """Return what ONNX Runtime says is wrong, in one line, without its codes and without the path of the file.
 
@@ -132,12 +143,22 @@ def open_session(path: Path, provider: Provider, intra_op_threads: int) -> onnxr
             if "cuda" in _CHAINS[chosen]:
                 # CUDA's libraries from pip lie where the loader does not look.
                 onnxruntime.preload_dlls()
-            session = onnxruntime.InferenceSession(str(path), options, providers=names)
+            # What starts on no other provider than the CPU has nothing to fall back to, and would say so in print.
+            session = onnxruntime.InferenceSession(
+                str(path), options, providers=names, enable_fallback=int(chosen != "cpu")
+            )
+        _read_all_names(session)
     except ONNX_ERRORS as error:
         raise ModelError(
             expected=f"an ONNX model at {path}",
             found=f"what ONNX Runtime {onnxruntime.__version__} cannot load ({told_by_runtime(error)})",
             fix="copy the file again; or export it again, with an older opset if it asks for a newer one",
+        ) from error
+    except UnicodeDecodeError as error:
+        raise ModelError(
+            expected=f"an ONNX model at {path}",
+            found="names or metadata in it that are not UTF-8",
+            fix="copy the file again, or export it again",
         ) from error
     if provider != "auto" and names[0] not in session.get_providers():
         raise _missing(provider, f"that it does not start and leaves {', '.join(session.get_providers())}")
