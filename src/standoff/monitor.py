@@ -122,8 +122,13 @@ def open_run(source: Path | str, out: Path | str, settings: Settings, *, overwri
 def _known_so_far(source: Source, pipeline: Pipeline) -> dict[str, Any]:
     return {
         "ground": getattr(pipeline.ground, "description", None),
-        "warnings": [*source.warnings, *stage_warnings(pipeline.motion, pipeline.ground, pipeline.hazard)],
+        "warnings": [*source.warnings, *pipeline_warnings(pipeline)],
     }
+
+
+def pipeline_warnings(pipeline: Pipeline) -> list[str]:
+    """Return what a pipeline's stages say of their own set-up, and of what they have seen so far."""
+    return stage_warnings(pipeline.detector, pipeline.motion, pipeline.ground, pipeline.hazard)
 
 
 def stage_warnings(*stages: object) -> list[str]:

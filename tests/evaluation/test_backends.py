@@ -19,8 +19,8 @@ from standoff.evaluation.backends import (
     compare_providers,
 )
 from standoff.stages.detect import available_providers
+from standoff.stages.detect.candidates import Candidates
 from standoff.stages.detect.network import Network
-from standoff.stages.detect.outputs import Candidates
 from standoff.stages.detect.params import Provider
 from standoff.stages.frames import frame_from_array
 

@@ -64,7 +64,9 @@ def _options(
         bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
     ] = False,
 ) -> None:
-    logging.basicConfig(level=logging.WARNING, format="standoff: %(message)s")
+    # What matplotlib and others have to say of themselves is not for whoever runs standoff.
+    logging.basicConfig(level=logging.ERROR, format="standoff: %(message)s")
+    logging.getLogger("standoff").setLevel(logging.WARNING)
 
 
 def main() -> None:

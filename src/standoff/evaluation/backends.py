@@ -20,9 +20,9 @@ from standoff.core.errors import DataError, MissingDependency, StandoffError
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import Frame, ImageArray, IntArray
 from standoff.evaluation.timing import Spread
+from standoff.stages.detect.candidates import Candidates
 from standoff.stages.detect.letterbox import Letterbox
 from standoff.stages.detect.network import Network
-from standoff.stages.detect.outputs import Candidates
 from standoff.stages.detect.params import DetectParams, Provider
 from standoff.stages.detect.runtime import ONNX_ERRORS, available_providers
 from standoff.stages.frames import open_source
@@ -152,7 +152,7 @@ def compare_providers(
             found=f"no box surer than {_SURE:g} in {len(pictures)}",
             fix="give pictures of what it was trained for",
         )
-    is_ordered = network.interface.family != "detr"
+    is_ordered = not network.interface.finds_once
     providers: tuple[Provider, ...] = tuple(name for name in get_args(Provider) if name != "auto")
     for provider in providers:
         try:

@@ -18,6 +18,7 @@ from PIL import Image, UnidentifiedImageError
 
 from standoff.core.errors import DataError
 from standoff.core.types import ImageArray
+from standoff.files.lfs import POINTER, is_pointer, refuse_pointer
 from standoff.labels.source import BadPicture
 from standoff.labels.types import UNREADABLE, LabelledPicture
 
@@ -60,7 +61,8 @@ def read_size_px(path: Path) -> tuple[int, int]:
     except FileNotFoundError as error:
         raise BadPicture(path, "no such file", "picture missing") from error
     except (OSError, ValueError, Image.DecompressionBombError) as error:
-        raise BadPicture(path, f"not a picture ({_reason(error)})", UNREADABLE) from error
+        reason = POINTER if is_pointer(path) else f"not a picture ({_reason(error)})"
+        raise BadPicture(path, reason, UNREADABLE) from error
 
 
 def load_picture(picture: LabelledPicture, reduction: int = 1) -> ImageArray:
@@ -83,6 +85,7 @@ def load_picture(picture: LabelledPicture, reduction: int = 1) -> ImageArray:
                 strict.load()
         image = cv2.imdecode(np.frombuffer(coded, np.uint8), _READ_AS[reduction] | cv2.IMREAD_IGNORE_ORIENTATION)
     except (OSError, ValueError, SyntaxError, Image.DecompressionBombError, cv2.error) as error:
+        refuse_pointer(picture.path, f"a picture in {picture.path}", DataError)
         raise _undecodable(picture.path, _reason(error)) from error
     if image is None:
         raise _undecodable(picture.path, "OpenCV cannot decode it")

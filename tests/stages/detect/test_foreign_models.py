@@ -225,7 +225,12 @@ OPEN = ("w", "h")
         (ROWS, (64, 64), "", "m.yaml, found no `key: value` lines"),
         (ROWS, (64, 64), "a: [", "m.yaml, found .*expected"),
         (ROWS, (64, 64), "family: yolox", "found no classes"),
-        (ROWS, (64, 64), "family: ssd\nclasses: [a]", "family ssd, which is none of yolov3, yolox, detr"),
+        (
+            ROWS,
+            (64, 64),
+            "family: ssd\nclasses: [a]",
+            "family ssd, .* none of yolov3, yolov5, yolov8, yolov10, yolox, detr",
+        ),
         (ROWS, (64, 64), YOLOX + "colours: bgr", r"unknown colours \(known: family, classes"),
         (ROWS, (64, 64), YOLOX + "colour: hsv", "colour hsv, which is none of rgb, bgr"),
         (ROWS, (64, 64), YOLOX + "pad: 300", "pad 300, which is not a level"),
@@ -248,7 +253,7 @@ OPEN = ("w", "h")
         ({"output": ROWS["output"][0]}, (64, 64), YOLOX, r"one output of rows .* found output \(84, 8\)"),
         ({"output": ROWS["output"] * np.float32(np.nan)}, (64, 64), YOLOX, "numbers .*found NaN in output"),
         ({"output": ROWS["output"] - 1}, (64, 64), YOLOV3, "probabilities, 0 to 1, .*found -"),
-        (ROWS, (64, 64), DETR, r"one output of boxes \(1, N, 4\)"),
+        (ROWS, (64, 64), DETR, r"one output of rows \(1, N, 4 \+ classes\)"),
         (LOGITS, (64, 64), "family: detr\nclasses: [person, car]", r"one output of logits .*2 classes"),
         ({**LOGITS, "boxes": LOGITS["boxes"] * 90}, (64, 64), DETR, "boxes as parts of the input.*found 45"),
         ({**LOGITS, "labels": np.zeros((1, 9), np.int64)}, (64, 64), DETR, "integer input .* found none"),
@@ -275,9 +280,10 @@ def test_the_example_in_the_code_describes_a_yolox(tmp_path: Path) -> None:
     text = "\n".join(line for line in (interface.__doc__ or "").splitlines() if line.startswith("    "))
     (tmp_path / "coco.names").write_text("\n".join(LABELS))
     (tmp_path / "m.yaml").write_text(textwrap.dedent(text))
-    read = interface.read_interface(tmp_path / "m.yaml", None)
+    read = interface.read_description(tmp_path / "m.yaml")
     assert (read.family, read.classes, read.input_size_px) == ("yolox", LABELS, (640, 640))
-    assert read.preprocessing == interface.USUAL["yolox"]
+    known = read.over(interface.Interface("yolox", LABELS, (640, 640)))
+    assert known.preprocessing == interface.USUAL["yolox"]
     assert read.output_names == {"rows": "output"}
 
 

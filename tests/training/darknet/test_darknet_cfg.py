@@ -43,13 +43,20 @@ def test_a_head_takes_the_anchors_of_its_mask() -> None:
     ("text", "message"),
     [
         ("[lstm]\n", r"a layer of convolutional, .* in \[lstm\] at line 5 of a\.cfg, found \[lstm\]"),
-        ("[convolutional]\nactivation=mish\n", r"an activation .* in \[convolutional\] at line 6 .*'mish'"),
+        ("[convolutional]\nactivation=gelu\n", r"an activation .* in \[convolutional\] at line 6 .*'gelu'"),
         ("[convolutional]\nsize=3x\n", r"numbers for 'size' in \[convolutional\] at line 6 .*'3x'"),
         ("[convolutional]\nsize=0\n", r"at least 1 for 'size' .* line 6 .*'0'"),
         ("[convolutional]\nsize=1.5\n", r"whole number .* line 6 .*'1\.5'"),
         ("[convolutional]\nsize=1,2\n", r"one number for 'size' .* line 6"),
         ("[convolutional]\ndilation=2\n", r"options that standoff understands .* line 6 .*'dilation'"),
-        ("[convolutional]\nsize=3\nsize=3\n", r"'size' once in \[convolutional\] at line 7"),
+        ("[convolutional]\nsize=inf\n", r"numbers of at most .* for 'size' .* line 6 .*'inf'"),
+        ("[convolutional]\nsize=nan\n", r"numbers of at most .* for 'size' .* line 6 .*'nan'"),
+        ("[convolutional]\n[route]\nlayers=-1\ngroups=2\ngroup_id=2\n", r"a group_id from 0 to 1 .*line 9 .*found 2"),
+        (
+            "[convolutional]\nactivation=linear\n[yolo]\nanchors=1,2\nclasses=2\nnew_coords=1\n",
+            r"activation=logistic before new_coords=1, for layer 1, \[yolo\] at line 7 .*found activation=linear",
+        ),
+        ("[yolo]\nanchors=1,2\nclasses=2\nnew_coords=1\n", r"a convolution with .* for layer 0.*found none"),
         ("[route]\nlayers=-1\n", r"an earlier layer for 'layers' .* line 6 .*-1"),
         ("[route]\nlayers=7\n", r"an earlier layer for 'layers' .* line 6 .*7"),
         ("[route]\n", r"whole numbers for 'layers' .* line 5"),
@@ -84,9 +91,34 @@ def test_text_that_is_no_detector_is_refused(text: str, message: str) -> None:
 def test_a_missing_and_a_binary_file_are_refused_in_one_line(tmp_path: Path) -> None:
     with pytest.raises(ModelError, match=re.escape(str(tmp_path / "none.cfg"))):
         read_cfg(tmp_path / "none.cfg")
-    (tmp_path / "binary.cfg").write_bytes(b"\xff\xfe\x00\x80")
+    (tmp_path / "binary.cfg").write_bytes(b"[net]\x00\x80")
     with pytest.raises(ModelError, match="not text"):
         read_cfg(tmp_path / "binary.cfg")
+
+
+def test_comments_may_be_in_any_encoding(tmp_path: Path) -> None:
+    expected = parse_cfg(f"{NET}{HEAD}")
+    text = f"{NET}# Größe … in Pixel\n{HEAD}"
+    for number, content in enumerate((text.encode("cp1252"), text.encode("utf-8"), text.encode("utf-8-sig"))):
+        path = tmp_path / f"{number}.cfg"
+        path.write_bytes(content)
+        assert read_cfg(path).heads[0].anchors_px == expected.heads[0].anchors_px
+    path.write_bytes(text.encode("utf-16"))
+    with pytest.raises(ModelError, match=r"in UTF-8 at .*found UTF-16\. Save the file as UTF-8"):
+        read_cfg(path)
+
+
+def test_of_an_option_that_stands_twice_the_first_counts_as_in_darknet(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    path = tmp_path / "a.cfg"
+    path.write_text("[net]\nbatch=1\nwidth=64\nbatch=64\nwidth=32\nheight=32\nheight = 32\n" + HEAD)
+    cfg = read_cfg(path)
+    assert (cfg.width_px, cfg.height_px) == (64, 32)
+    assert [record.message for record in caplog.records] == [
+        "a.cfg, line 4: 'batch' stands in [net] a second time; as in Darknet 1 of line 2 counts, not 64",
+        "a.cfg, line 5: 'width' stands in [net] a second time; as in Darknet 64 of line 3 counts, not 32",
+    ]
 
 
 @pytest.mark.shared

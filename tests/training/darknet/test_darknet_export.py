@@ -20,7 +20,7 @@ from standoff.training import export_darknet, yolov3_tiny_cfg
 from standoff.training.architectures import ARCHITECTURES
 from standoff.training.architectures.refitted import pointed_cfg
 from standoff.training.architectures.yolov3 import YOLOV3_ANCHORS_PX
-from standoff.training.darknet.cfg import read_cfg
+from standoff.training.darknet.cfg import parse_cfg, read_cfg
 from standoff.training.darknet.network import DarknetNetwork, DecodedNetwork
 from standoff.training.darknet.weights import load_weights
 
@@ -175,6 +175,38 @@ def test_a_size_or_names_that_do_not_fit_are_refused(
     files.names.write_text(names * "x\n")
     with pytest.raises(ModelError, match=message):
         export_darknet(*files, size_px, tmp_path / "a.onnx")
+
+
+def test_names_in_another_encoding_are_refused_and_the_encoding_is_named(
+    make_darknet_files: MakeFiles, tmp_path: Path
+) -> None:
+    files = make_darknet_files(ALL_LAYERS, 0)
+    files.names.write_bytes("worker\nträger\n".encode("cp1252"))
+    with pytest.raises(ModelError, match=r"byte 0xE4 in line 2, which is .ä. in Windows-1252\. Save the file as UTF-8"):
+        export_darknet(*files, None, tmp_path / "a.onnx")
+    files.names.write_text("worker\nträger\n", encoding="utf-8-sig")
+    assert export_darknet(*files, None, tmp_path / "a.onnx").classes == ("worker", "träger")
+
+
+def test_a_route_takes_its_part_of_each_of_its_layers() -> None:
+    # As Darknet's forward_route_layer copies them; OpenCV reads groups of one layer only.
+    text = "[net]\nwidth=8\nheight=8\n"
+    text += "".join(f"[convolutional]\nfilters={filters}\nactivation=linear\n" for filters in (4, 8))
+    text += "[route]\nlayers=-1,-2\ngroups=2\ngroup_id=1\n[yolo]\nanchors=1,1\nclasses=1\n"
+    network = DarknetNetwork(parse_cfg(text))
+    picture = torch.rand(1, 3, 8, 8)
+    with torch.no_grad():
+        (head,) = network(picture)
+        first = network.blocks[0](picture)
+        second = network.blocks[1](first)
+    torch.testing.assert_close(head, torch.cat([second[:, 4:], first[:, 2:]], dim=1))
+    with pytest.raises(ModelError, match=r"channels that 3 groups divide in layer 2, \[route\] .*found 8 and 4"):
+        DarknetNetwork(parse_cfg(text.replace("groups=2", "groups=3")))
+
+
+def test_an_input_that_no_memory_holds_is_refused(make_darknet_files: MakeFiles, tmp_path: Path) -> None:
+    with pytest.raises(ModelError, match="at most 8192 px a side, found 1000000x32"):
+        export_darknet(*make_darknet_files(ALL_LAYERS, 0), (1000000, 32), tmp_path / "a.onnx")
 
 
 def test_other_than_three_channels_are_refused(make_darknet_files: MakeFiles, tmp_path: Path) -> None:

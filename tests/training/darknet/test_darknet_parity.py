@@ -13,10 +13,12 @@ import pytest
 import tolerances
 from laws import few
 from training.conftest import DarknetFiles
+from training.darknet.published_cfgs import PUBLISHED
 
 from standoff.training import export_darknet, yolov3_cfg, yolov3_tiny_cfg
 from standoff.training.architectures import ARCHITECTURES
 from standoff.training.architectures.yolov3 import YOLOV3_ANCHORS_PX
+from standoff.training.darknet.cfg import Yolo, parse_cfg
 
 Picture = npt.NDArray[np.uint8]
 Rows = npt.NDArray[np.float32]
@@ -89,6 +91,20 @@ def test_yolo_fastest_with_a_stride_8_head_decodes_as_in_opencv(
     anchors_px = YOLOV3_ANCHORS_PX[: len(architecture.strides)]
     files = make_darknet_files(architecture.compose(7, *size_px, anchors_px), seed)
     worst = _worst_differences(files, _noise(size_px, seed), size_px, tmp_path)
+    assert worst.max() <= tolerances.DARKNET_DECODED
+
+
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_networks_since_yolov4_decode_as_in_opencv(
+    make_darknet_files: Callable[[str, int], DarknetFiles], tmp_path: Path, name: str
+) -> None:
+    compose, heads = PUBLISHED[name]
+    size_px = (128, 96)
+    text = compose(size_px)
+    layers = parse_cfg(text).layers
+    assert [index for index, layer in enumerate(layers) if isinstance(layer, Yolo)] == [*heads]
+    assert len(layers) == heads[-1] + 1
+    worst = _worst_differences(make_darknet_files(text, 0), _noise(size_px, 0), size_px, tmp_path)
     assert worst.max() <= tolerances.DARKNET_DECODED
 
 

@@ -6,11 +6,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from pointers import POINTER
 
 from standoff.core.errors import ModelError, OutputError
+from standoff.training.darknet import weights
 from standoff.training.darknet.cfg import parse_cfg
 from standoff.training.darknet.network import DarknetNetwork
-from standoff.training.darknet.weights import WeightsHeader, fill_convolutions, load_weights, read_numbers, save_weights
+from standoff.training.darknet.weights import (
+    WeightsHeader,
+    fill_convolutions,
+    load_network,
+    load_weights,
+    read_numbers,
+    save_weights,
+)
 
 CFG = """[net]
 width=8
@@ -93,6 +102,24 @@ def test_weights_that_do_not_fit_say_at_which_layer(tmp_path: Path, numbers: int
     with pytest.raises(ModelError, match=message) as caught:
         load_weights(_network(), _write(tmp_path / "a.weights", numbers))
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("missing", [1, SECOND, SECOND + 1, -1])
+def test_no_network_is_built_unless_the_file_holds_all_of_it(
+    tmp_path: Path, missing: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = _write(tmp_path / "a.weights", FIRST + SECOND)
+    assert load_network(parse_cfg(CFG, "a.cfg"), path).convolutions()[1][1].convolution.weight.numel() == 6 * 4
+    monkeypatch.setattr(weights, "DarknetNetwork", None)
+    with pytest.raises(ModelError, match=r"numbers in a\.weights"):
+        load_network(parse_cfg(CFG, "a.cfg"), _write(path, FIRST + SECOND - missing))
+
+
+def test_a_pointer_of_git_lfs_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "a.weights"
+    path.write_text(POINTER)
+    with pytest.raises(ModelError, match=r"found a Git LFS pointer, not the file\. Run `git lfs pull`"):
+        read_numbers(path)
 
 
 def test_numbers_that_are_not_finite_say_in_which_layer(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 import tolerances
 import torch
+from pointers import POINTER
 from torch import Tensor
 from torch.nn import functional
 
@@ -133,7 +134,15 @@ def test_other_files_and_other_networks_are_refused_in_one_line(package_file: Pa
     network = DarknetNetwork(parse_cfg(efficientnet_lite0_cfg(2, 64, 64)))
     (tmp_path / "noise.pth").write_bytes(b"not a pickle")
     torch.save({"conv": torch.zeros(1)}, tmp_path / "other.pth")
-    for name, found in (("noise", "found"), ("none", "No such file"), ("other", "no _conv_stem.weight")):
+    torch.save({"model": torch.nn.Linear(1, 1)}, tmp_path / "ultralytics.pth")
+    (tmp_path / "pointer.pth").write_text(POINTER)
+    for name, found in (
+        ("noise", "found"),
+        ("none", "No such file"),
+        ("other", "no _conv_stem.weight"),
+        ("ultralytics", "no weights alone, but objects of the program"),
+        ("pointer", "a Git LFS pointer"),
+    ):
         with pytest.raises(ModelError, match=rf"package .* at .*{name}\.pth.*{found}") as caught:
             fill_efficientnet_lite0(network, tmp_path / f"{name}.pth")
         assert "\n" not in str(caught.value)

@@ -16,6 +16,7 @@ from standoff.core.errors import DataError
 from standoff.core.homography import BoolArray, FloatArray, apply, invert
 from standoff.core.pose import View
 from standoff.core.types import ImageArray, IntArray
+from standoff.files.lfs import refuse_pointer
 from standoff.simulation.composites.backgrounds import Background
 from standoff.simulation.flight import Still
 from standoff.simulation.mesh import Float32Array
@@ -77,6 +78,7 @@ def frame(rng: np.random.Generator, background: Background, size_px: tuple[int, 
     """
     photo = cv2.imread(str(background.path), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
     if photo is None:
+        refuse_pointer(background.path, f"a photograph in {background.path}", DataError)
         raise DataError(expected="a photograph", found=f"{background.path}", fix="remove it from the backgrounds")
     if rng.random() < 0.5:
         photo, background = _mirrored(photo, background)

@@ -19,6 +19,8 @@ _SYNONYMS: Final = {
     "vehicle": ("car", "van", "bus", "truck", "motorbike", "motorcycle"),
 }
 
+_LABELS_NAMED: Final = 12
+
 DEFAULT_CLASS_MAP: Final[Mapping[str, str]] = MappingProxyType(
     {name: name for name in CLASS_BY_NAME}
     | {synonym: name for name, synonyms in _SYNONYMS.items() for synonym in synonyms}
@@ -59,10 +61,12 @@ def map_classes(labels: tuple[str, ...], overrides: Mapping[str, str], model: st
         raise ModelError(
             expected=f"a label in {model} that is a class of the site ({', '.join(CLASS_BY_NAME)})",
             found=_listed(labels),
-            fix="give a class map from the model's labels to the site's classes",
+            fix="say in a settings file which label is which class, such as "
+            f"`detect: {{class_map: {{{labels[0]}: worker}}}}`, and give it with --config",
         )
     return mapped
 
 
 def _listed(labels: tuple[str, ...]) -> str:
-    return ", ".join(labels) or "no label"
+    more = f" and {len(labels) - _LABELS_NAMED} more" if len(labels) > _LABELS_NAMED else ""
+    return (", ".join(labels[:_LABELS_NAMED]) or "no label") + more

@@ -12,12 +12,12 @@ import onnxruntime
 from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import Detections, Frame, ImageArray, IntArray
+from standoff.stages.detect.candidates import Candidates
 from standoff.stages.detect.class_map import map_classes
 from standoff.stages.detect.feet import feet_of
 from standoff.stages.detect.letterbox import Letterbox, resize
 from standoff.stages.detect.model_card import file_sha256
 from standoff.stages.detect.network import Network
-from standoff.stages.detect.outputs import Candidates
 from standoff.stages.detect.params import DetectParams
 from standoff.stages.detect.slices import View, held_whole_px, views
 from standoff.stages.detect.suppression import join_cut, prefer_finer, suppress
@@ -25,7 +25,7 @@ from standoff.stages.detect.suppression import join_cut, prefer_finer, suppress
 _CUT_MARGIN_INPUT_PX = 4.0
 """A network places the edge of a thing that its input cuts off about half a fine cell from the border."""
 _SAME_BOX_IOU: Final = 0.95
-"""A DETR finds each thing once; it may give the same box under two labels that are one class of the site."""
+"""What finds each thing once may give the same box under two labels that are one class of the site."""
 _COARSE_IOU: Final = 0.2
 """Of people 25 px tall, seen 12 px tall, whole frames and slices give boxes that overlap by 0.2 to 0.45: measured on
 scaled-down PETS frames with yolo-fastest at 960x544, 2x2 slices: from precision 0.72 to 0.78 at recall 0.65."""
@@ -35,8 +35,8 @@ class OnnxDetector:
     """Detector that reads everything it must know from the model's file, or from the description beside it.
 
     Args:
-        model_path: Made by `standoff export` or `standoff train`; or any detector of a known family, with its
-            description (see `standoff.stages.detect.interface`).
+        model_path: Made by `standoff export` or `standoff train`, or exported by Ultralytics; or any detector of a
+            known family, with its description (see `standoff.stages.detect.interface`).
         params: Settings.
 
     Raises:
@@ -53,8 +53,8 @@ class OnnxDetector:
         self._site_class_of = map_classes(self._classes, self._params.class_map, path.name)
         self._columns = self._columns_by_class()
         self._thresholds = self._thresholds_by_class()
-        is_detr = self._network.interface.family == "detr"
-        self._iou_in_view = max(self._params.nms_iou, _SAME_BOX_IOU) if is_detr else self._params.nms_iou
+        finds_once = self._network.interface.finds_once
+        self._iou_in_view = max(self._params.nms_iou, _SAME_BOX_IOU) if finds_once else self._params.nms_iou
         self._sha256 = file_sha256(path)
 
     def _columns_by_class(self) -> dict[int, IntArray]:
@@ -78,6 +78,9 @@ class OnnxDetector:
             "model": self._name,
             "sha256": self._sha256,
             "family": self._network.interface.family,
+            "task": self._network.interface.task,
+            "boxes": "parts of the input" if self._network.boxes_are_parts else "as usual in the family",
+            "warnings": list(self._network.warnings),
             "input_size_px": list(self._network.interface.input_size_px),
             "classes": list(self._classes),
             "class_map": dict(self._site_class_of),
@@ -141,7 +144,8 @@ class OnnxDetector:
         class_id = np.array(list(self._columns), dtype=np.int64)[best]
         xyxy_px = letterbox.to_source(candidates.xyxy_px)
         wanted = (score >= self._thresholds[class_id]) & (xyxy_px[:, 2:] > xyxy_px[:, :2]).all(axis=1)
-        found = Detections(xyxy_px, score, class_id, *feet_of(candidates, letterbox))[wanted]
+        values = xyxy_px, score, class_id, *feet_of(candidates, letterbox)
+        found = Detections(*(value[wanted] for value in values))
         return suppress(found, self._iou_in_view, self._params.max_detections)
 
 

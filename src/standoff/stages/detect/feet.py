@@ -6,8 +6,8 @@ import numpy as np
 
 from standoff.core.boxes import unknown_points
 from standoff.core.homography import FloatArray
+from standoff.stages.detect.candidates import Candidates
 from standoff.stages.detect.letterbox import Letterbox
-from standoff.stages.detect.outputs import Candidates
 
 
 def feet_of(candidates: Candidates, letterbox: Letterbox) -> tuple[FloatArray, FloatArray]:

@@ -10,6 +10,7 @@ import numpy.typing as npt
 import onnxruntime
 
 from standoff.core.errors import ModelError
+from standoff.stages.detect.interface import Family
 from standoff.stages.detect.model_card import INPUT_NAME, OUTPUT_NAME, POINTS_NAME, ModelCard
 
 _PICTURE_TYPES: Final[dict[str, type[np.generic]]] = {
@@ -21,6 +22,10 @@ _SIZE_TYPES: Final[dict[str, type[np.generic]]] = {"tensor(int64)": np.int64, "t
 _YOLO_COLUMNS: Final = 5
 _POINT_COLUMNS: Final = 4
 _YOLOX_STRIDES_PX: Final = (8, 16, 32)
+_ANCHORS: Final = 3
+_CHOSEN_COLUMNS: Final = 6
+_MOST_CHOSEN: Final = 1000
+"""Networks that choose by themselves give a few hundred boxes, those that do not some thousand."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,13 +118,22 @@ def suggested_description(session: onnxruntime.InferenceSession, inputs: GraphIn
     return f"{{family: {_likely_family(session, inputs)}, classes: labels.txt{size}}}"
 
 
-def _likely_family(session: onnxruntime.InferenceSession, inputs: GraphInputs) -> str:
-    outputs = session.get_outputs()
-    if len(outputs) > 1:
+def _likely_family(session: onnxruntime.InferenceSession, inputs: GraphInputs) -> Family:
+    shapes = [output.shape for output in session.get_outputs()]
+    tables = [shape for shape in shapes if len(shape) == 3]
+    if len(tables) != 1 or any(len(shape) < 3 for shape in shapes):
         return "detr"
-    rows = next(iter(outputs[0].shape[1:2]), None)
-    if inputs.size_px is None or not isinstance(rows, int):
+    rows, columns = tables[0][1:]
+    if not isinstance(rows, int):
+        return "yolox"
+    if isinstance(columns, int) and rows < columns:
+        return "yolov8"
+    if columns == _CHOSEN_COLUMNS and rows <= _MOST_CHOSEN:
+        return "yolov10"
+    if inputs.size_px is None:
         return "yolox"
     width_px, height_px = inputs.size_px
     cells = sum((width_px // stride_px) * (height_px // stride_px) for stride_px in _YOLOX_STRIDES_PX)
-    return "yolox" if rows == cells else "yolov3"
+    if rows == cells:
+        return "yolox"
+    return "yolov5" if rows == _ANCHORS * cells else "yolov3"

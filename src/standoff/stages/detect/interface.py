@@ -1,9 +1,9 @@
 """What must be known of a network to use it, and the YAML file that says it of a foreign one.
 
-A model that `standoff export` or `standoff train` made says it all itself (`standoff.stages.detect.model_card`). Beside
-another `M.onnx` lies `M.yaml`:
+A model that `standoff export` or `standoff train` made says it all itself (`standoff.stages.detect.model_card`), and so
+does one that Ultralytics exported (`standoff.stages.detect.self_description`). Beside another `M.onnx` lies `M.yaml`:
 
-    family: yolox            # yolov3, yolox or detr (RT-DETR, D-FINE); see standoff.stages.detect.outputs
+    family: yolox            # yolov3, yolov5, yolov8, yolov10, yolox or detr; see standoff.stages.detect.outputs
     classes: coco.names      # a list, or a file with one label a line, beside this one; in the order of the outputs
     input_size: 640x640      # width x height; only where the graph leaves it open
     # What follows has the family's usual value where it is not given:
@@ -14,6 +14,8 @@ another `M.onnx` lies `M.yaml`:
     placement: top-left      # of the scaled picture: centre, top-left, or stretch: fill the input
     pad: 114                 # level around it, 0 to 255
     outputs: {rows: output}  # only where shapes do not tell: rows, or boxes and logits, or boxes, labels and scores
+
+Where the model says of itself what it is, everything may be left out, and what is said here goes before.
 """
 
 from __future__ import annotations
@@ -28,13 +30,19 @@ import yaml
 
 from standoff.core.classes import names_by_line
 from standoff.core.errors import ModelError
+from standoff.files.utf8_text import read_utf8
 from standoff.stages.detect.letterbox import DARKNET, Colour, Placement, Preprocessing
 
-Family = Literal["yolov3", "yolox", "detr"]
+Family = Literal["yolov3", "yolov5", "yolov8", "yolov10", "yolox", "detr"]
+Task = Literal["detect", "segment", "pose", "obb"]
 
 ROLES: Final = ("rows", "boxes", "logits", "labels", "scores")
+_GREY_AROUND: Final = Preprocessing(pad=114.0)
 USUAL: Final[Mapping[Family, Preprocessing]] = {
     "yolov3": DARKNET,
+    "yolov5": _GREY_AROUND,
+    "yolov8": _GREY_AROUND,
+    "yolov10": _GREY_AROUND,
     "yolox": Preprocessing(colour="bgr", white=255.0, placement="top-left", pad=114.0),
     "detr": Preprocessing(placement="stretch"),
 }
@@ -51,6 +59,8 @@ class Interface:
         input_size_px: (width, height).
         preprocessing: What it wants of a picture.
         output_names: Role to name, where shapes do not tell.
+        task: What else than boxes its rows end with.
+        keypoint_values: Numbers for the key points of a box, if that is the task.
     """
 
     family: Family
@@ -58,26 +68,59 @@ class Interface:
     input_size_px: tuple[int, int]
     preprocessing: Preprocessing = DARKNET
     output_names: Mapping[str, str] = field(default_factory=dict)
+    task: Task = "detect"
+    keypoint_values: int = 0
+
+    @property
+    def finds_once(self) -> bool:
+        """Whether the network gives each thing once, surest first, and not once for each cell that sees it."""
+        return self.family in ("detr", "yolov10")
 
 
-def read_interface(path: Path, graph_size_px: tuple[int, int] | None) -> Interface:
+@dataclass(frozen=True, slots=True)
+class Description:
+    """What is said of a model beside it; whatever is None or empty is not said.
+
+    Attributes:
+        family: What its outputs mean.
+        classes: Labels in the order of its outputs.
+        input_size_px: (width, height).
+        preprocessing: Fields of `Preprocessing` that differ from the family's usual ones.
+        output_names: Role to name.
+    """
+
+    family: Family | None = None
+    classes: tuple[str, ...] = ()
+    input_size_px: tuple[int, int] | None = None
+    preprocessing: Mapping[str, Any] = field(default_factory=dict)
+    output_names: Mapping[str, str] = field(default_factory=dict)
+
+    def over(self, known: Interface) -> Interface:
+        """Return an interface with what is said here put before what it says."""
+        return replace(
+            known,
+            classes=self.classes or known.classes,
+            preprocessing=replace(USUAL[known.family], **self.preprocessing),
+            output_names=self.output_names or known.output_names,
+        )
+
+
+def read_description(path: Path) -> Description:
     """Read the description that lies beside a model.
 
-    Args:
-        path: YAML file.
-        graph_size_px: (width, height) where the graph fixes it.
-
     Raises:
-        ModelError: The file cannot be read, does not fit the graph, or leaves something out.
+        ModelError: The file cannot be read.
     """
     try:
-        return _interface(_parsed(path), graph_size_px, path)
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, ValueError) as error:
-        raise ModelError(
-            expected=f"the description of a detector in {path}",
-            found=str(error),
-            fix="see 'Detectors from elsewhere' in the documentation",
-        ) from error
+        return _description(_parsed(path), path)
+    except (OSError, yaml.YAMLError, ValueError, RecursionError) as error:
+        raise undescribed(path, str(error)) from error
+
+
+def undescribed(path: Path, found: str) -> ModelError:
+    """Return the error of a description that does not do."""
+    fix = "see 'Detectors from elsewhere' in the documentation"
+    return ModelError(expected=f"the description of a detector in {path}", found=found, fix=fix)
 
 
 def _parsed(path: Path) -> dict[str, Any]:
@@ -87,37 +130,36 @@ def _parsed(path: Path) -> dict[str, Any]:
     unknown = [str(key) for key in content if key not in _READERS]
     if unknown:
         raise ValueError(f"unknown {', '.join(unknown)} (known: {', '.join(_READERS)})")
-    missing = [key for key in ("family", "classes") if key not in content]
-    if missing:
-        raise ValueError(f"no {' and no '.join(missing)}")
     return {key: _READERS[key](key, value) for key, value in content.items()}
 
 
-def _interface(said: dict[str, Any], graph_size_px: tuple[int, int] | None, path: Path) -> Interface:
-    family: Family = said.pop("family")
-    classes = said.pop("classes")
-    size_px = said.pop("input_size", graph_size_px)
-    if size_px is None:
-        raise ValueError("no input_size, which the graph leaves open; such as `input_size: 640x640`")
-    if graph_size_px is not None and size_px != graph_size_px:
-        raise ValueError(f"input_size {_times(size_px)}, but the graph takes {_times(graph_size_px)}")
-    return Interface(
-        family=family,
+def _description(said: dict[str, Any], path: Path) -> Description:
+    classes = said.pop("classes", ())
+    return Description(
+        family=said.pop("family", None),
         classes=_labels(path.parent / classes) if isinstance(classes, str) else classes,
-        input_size_px=size_px,
+        input_size_px=said.pop("input_size", None),
         output_names=said.pop("outputs", {}),
-        preprocessing=replace(USUAL[family], **said),
+        preprocessing=said,
     )
 
 
 def _labels(path: Path) -> tuple[str, ...]:
-    labels = names_by_line(path.read_text(encoding="utf-8"))
+    try:
+        labels = names_by_line(read_utf8(path))
+    except ValueError as error:
+        raise ValueError(f"{path.name}, a file of labels, with {error}") from error
     if not labels:
         raise ValueError(f"no label in {path.name}")
     return labels
 
 
-def _times(size_px: tuple[int, int]) -> str:
+def times(size_px: tuple[int, int]) -> str:
+    """Write a size as descriptions do.
+
+    >>> times((640, 384))
+    '640x384'
+    """
     return f"{size_px[0]}x{size_px[1]}"
 
 
@@ -165,7 +207,7 @@ def _spread(key: str, value: object) -> tuple[float, ...]:
 
 
 def _outputs(key: str, value: object) -> dict[str, str]:
-    if not isinstance(value, dict) or not value.keys() <= set(ROLES):
+    if not isinstance(value, dict) or not set(value) <= set(ROLES):
         raise ValueError(f"{key} {value}, which do not give names to some of {', '.join(ROLES)}")
     return {role: str(name) for role, name in value.items()}
 

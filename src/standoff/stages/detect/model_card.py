@@ -77,7 +77,10 @@ class ModelCard:
         """
         if FORMAT_KEY not in metadata:
             raise ModelError(
-                expected=f"a model exported by standoff at {name}", found="an ONNX file without its metadata", fix=_FIX
+                expected=f"a model exported by standoff at {name}",
+                found="an ONNX file without its metadata",
+                fix="give a file that `standoff export` or `standoff train` made; others can be run and compared, not "
+                "changed",
             )
         if metadata[FORMAT_KEY] != FORMAT:
             found = f"format '{metadata[FORMAT_KEY]}'"

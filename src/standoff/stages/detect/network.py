@@ -6,25 +6,24 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import onnxruntime
 
 from standoff.core.errors import ModelError
 from standoff.core.types import ImageArray
-from standoff.stages.detect.graph import GraphInputs, check_own_graph, suggested_description
-from standoff.stages.detect.interface import Interface, read_interface
-from standoff.stages.detect.letterbox import Letterbox, Preprocessing
-from standoff.stages.detect.model_card import FORMAT_KEY, OUTPUT_NAME, POINTS_NAME, ModelCard
-from standoff.stages.detect.outputs import (
+from standoff.stages.detect.candidates import (
     Candidates,
     Output,
     OutputReader,
     UnreadableOutputs,
     check_candidates,
-    find_reader,
-    read_rows,
 )
+from standoff.stages.detect.foreign import Foreigner
+from standoff.stages.detect.graph import GraphInputs, check_own_graph, suggested_description
+from standoff.stages.detect.interface import Interface
+from standoff.stages.detect.letterbox import Letterbox, Preprocessing
+from standoff.stages.detect.model_card import FORMAT_KEY, OUTPUT_NAME, POINTS_NAME, ModelCard
+from standoff.stages.detect.outputs import read_rows
 from standoff.stages.detect.params import Provider
-from standoff.stages.detect.runtime import ONNX_ERRORS, open_session
+from standoff.stages.detect.runtime import ONNX_ERRORS, open_session, told_by_runtime
 
 _MIDDLE_LEVEL = 127
 
@@ -33,9 +32,14 @@ class Network:
     """A loaded model and how to talk to it.
 
     Args:
-        path: ONNX file with standoff's metadata, or with a YAML file of the same name beside it.
+        path: ONNX file with metadata of standoff or Ultralytics, or with a YAML file of the same name beside it.
         provider: What computes.
         intra_op_threads: Threads on the CPU; 0: as many as cores.
+
+    Attributes:
+        interface: How it is talked to.
+        boxes_are_parts: Its boxes come as parts of the input, where others of its family have pixels.
+        warnings: What of it is not as it was said, or not as usual.
 
     Raises:
         ModelError: The file is no detector that can be read, or nothing says how.
@@ -51,16 +55,18 @@ class Network:
             card = ModelCard.from_metadata(metadata, path.name)
             check_own_graph(self._session, card, path.name)
         self._inputs = GraphInputs.of(self._session, path.name)
+        self.warnings: tuple[str, ...] = ()
         if is_own:
             self.interface = Interface("yolov3", card.classes, card.input_size_px)
-            self._fix = "export the model again from sound weights"
+            self._reader = self._own_reader()
+            self._unreadable = self._own_unreadable
         else:
-            self.interface = _described(self._session, self._inputs, path)
-            family, description = self.interface.family, path.with_suffix(".yaml").name
-            self._fix = f"correct `family: {family}` or the rest of {description}, or export the model again"
+            suggestion = suggested_description(self._session, self._inputs)
+            told_size = self._inputs.told_size is not None
+            foreigner = Foreigner(path, metadata, self._inputs.size_px, told_size, suggestion)
+            self.interface, self._reader, self.warnings = foreigner.settle(self._trial)
+            self._unreadable = foreigner.unreadable
         self._preprocessing = _fitting_type(self.interface.preprocessing, self._inputs, path.name)
-        self._constant = self._inputs.constant_feed(self.interface.input_size_px)
-        self._reader = self._own_reader() if is_own else self._reader_from_trial()
 
     @property
     def providers(self) -> list[str]:
@@ -70,6 +76,11 @@ class Network:
     def letterbox(self, source_size_px: tuple[int, int]) -> Letterbox:
         """Return where a picture of this (width, height) goes in the input."""
         return Letterbox.fit(source_size_px, self.interface.input_size_px, self._preprocessing.placement)
+
+    @property
+    def boxes_are_parts(self) -> bool:
+        """Whether its boxes come as parts of the input, where others of its family have pixels."""
+        return self._reader.boxes_are_parts
 
     def candidates(self, resized: ImageArray, letterbox: Letterbox, least: float) -> Candidates:
         """Look at a picture.
@@ -82,7 +93,7 @@ class Network:
         Raises:
             ModelError: The network gives NaN, or what its family does not.
         """
-        outputs = self._run(self._reader.names, resized, letterbox)
+        outputs = self._run(self._reader.names, resized, letterbox, self._preprocessing)
         try:
             found = self._reader.read(outputs, least)
             check_candidates(found)
@@ -90,11 +101,16 @@ class Network:
             raise self._unreadable(error) from error
         return found
 
-    def _run(self, names: tuple[str, ...], resized: ImageArray, letterbox: Letterbox) -> list[Output]:
-        picture = letterbox.network_input(resized, self._preprocessing)
+    def _run(
+        self, names: tuple[str, ...], resized: ImageArray, letterbox: Letterbox, preprocessing: Preprocessing
+    ) -> list[Output]:
+        picture = letterbox.network_input(resized, preprocessing)
         if self._inputs.dtype is np.uint8:
             picture = np.rint(picture)
-        feed = {self._inputs.picture: picture.astype(self._inputs.dtype, copy=False), **self._constant}
+        feed = {
+            self._inputs.picture: picture.astype(self._inputs.dtype, copy=False),
+            **self._inputs.constant_feed(letterbox.input_size_px),
+        }
         outputs: list[Output] = self._session.run(list(names), feed)
         return outputs
 
@@ -102,38 +118,25 @@ class Network:
         has_points = POINTS_NAME in {node.name for node in self._session.get_outputs()}
         return OutputReader((OUTPUT_NAME, POINTS_NAME) if has_points else (OUTPUT_NAME,), read_rows)
 
-    def _reader_from_trial(self) -> OutputReader:
-        """Find out how to read a foreign network, by showing it a grey picture."""
-        width_px, height_px = self.interface.input_size_px
+    def _own_unreadable(self, error: UnreadableOutputs) -> ModelError:
+        fix = "export the model again from sound weights"
+        return ModelError(expected=f"{error.expected} from {self._name}", found=error.found, fix=fix)
+
+    def _trial(self, interface: Interface) -> dict[str, Output]:
+        """Show a grey picture to a foreign network."""
+        width_px, height_px = interface.input_size_px
         grey = np.full((height_px, width_px, 3), _MIDDLE_LEVEL, np.uint8)
         names = tuple(node.name for node in self._session.get_outputs())
+        preprocessing = _fitting_type(interface.preprocessing, self._inputs, self._name)
+        letterbox = Letterbox.fit((width_px, height_px), interface.input_size_px, preprocessing.placement)
         try:
-            outputs = self._run(names, grey, self.letterbox((width_px, height_px)))
-            trial = dict(zip(names, outputs, strict=True))
-            return find_reader(self.interface, trial, self._inputs.told_size is not None)
-        except UnreadableOutputs as error:
-            raise self._unreadable(error) from error
+            return dict(zip(names, self._run(names, grey, letterbox, preprocessing), strict=True))
         except ONNX_ERRORS as error:
             raise ModelError(
                 expected=f"{self._name} to take a picture of {width_px}x{height_px}",
-                found=f"what ONNX Runtime cannot compute ({str(error)[:120]})",
+                found=f"what ONNX Runtime cannot compute ({told_by_runtime(error)})",
                 fix="correct input_size in its description",
             ) from error
-
-    def _unreadable(self, error: UnreadableOutputs) -> ModelError:
-        return ModelError(expected=f"{error.expected} from {self._name}", found=error.found, fix=self._fix)
-
-
-def _described(session: onnxruntime.InferenceSession, inputs: GraphInputs, path: Path) -> Interface:
-    description = path.with_suffix(".yaml")
-    if not description.is_file():
-        raise ModelError(
-            expected=f"a model exported by standoff at {path.name}, or its description in {description.name} beside it",
-            found="an ONNX file without its metadata, and no description",
-            fix=f"write {description.name}, such as {suggested_description(session, inputs)}, "
-            "and labels.txt with one label a line in the order of the model's outputs",
-        )
-    return read_interface(description, inputs.size_px)
 
 
 def _fitting_type(preprocessing: Preprocessing, inputs: GraphInputs, name: str) -> Preprocessing:

@@ -12,6 +12,7 @@ import av
 from av.stream import Disposition
 
 from standoff.core.errors import SourceError, SourceTruncated
+from standoff.files.lfs import refuse_pointer
 
 if TYPE_CHECKING:
     from av.container import InputContainer
@@ -30,6 +31,7 @@ def open_video(path: Path) -> tuple[InputContainer, VideoStream]:
     """
     if path.stat().st_size == 0:
         raise SourceError(expected="a video file", found=f"{path.name}, which is empty", fix="copy it again")
+    refuse_pointer(path, f"a video file in {path.name}", SourceError)
     try:
         # The prefix keeps names such as "cam:1.mp4" from being taken for a protocol.
         container = av.open(f"file:{path}", metadata_errors="replace")

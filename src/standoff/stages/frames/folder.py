@@ -13,6 +13,7 @@ from typing import Any
 import av
 
 from standoff.core.errors import SourceError
+from standoff.files.lfs import refuse_pointer
 from standoff.stages.frames.album import read_album
 from standoff.stages.frames.fingerprint import fingerprint
 from standoff.stages.frames.photograph import read_photograph
@@ -71,6 +72,7 @@ def _decode(path: Path, scaler: Scaler) -> AvPicture:
         if frame is None:
             raise ValueError("it holds no picture")
     except (av.FFmpegError, IndexError, OSError, ValueError) as error:
+        refuse_pointer(path, f"an image in {path.name}", SourceError)
         raise SourceError(
             expected="an image that can be decoded",
             found=f"{path.name}: {error}",

@@ -19,6 +19,7 @@ import numpy as np
 from standoff.core.errors import SourceError
 from standoff.core.homography import FloatArray
 from standoff.core.types import ImageArray
+from standoff.files.lfs import refuse_pointer
 
 PICTURE_SUFFIXES = (".bmp", ".jpeg", ".jpg", ".png", ".tif", ".tiff", ".webp")
 _WINDOW_OF_SQUARE = 0.3
@@ -113,6 +114,7 @@ def _read_view(path: Path, pattern: tuple[int, int]) -> BoardView:
         raise SourceError(expected="a picture", found=f"{path}: {error.strerror}", fix="check the path") from None
     gray = cv2.imdecode(data, cv2.IMREAD_GRAYSCALE) if data.size else None
     if gray is None:
+        refuse_pointer(path, f"a picture in {path}", SourceError)
         fix = "replace the file or take it out of the folder"
         raise SourceError(expected="a picture", found=f"{path}, which cannot be decoded", fix=fix)
     height_px, width_px = gray.shape

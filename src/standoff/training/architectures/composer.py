@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TypeAlias
 
 from standoff.core.errors import ModelError
-from standoff.training.darknet.cfg import Activation
+from standoff.training.darknet.sections import Activation
 
 Anchors: TypeAlias = Sequence[Sequence[tuple[float, float]]]
 """(width, height) in network input pixels of each head's anchors; heads from fine to coarse."""

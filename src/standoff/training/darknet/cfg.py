@@ -1,20 +1,22 @@
 """Read a Darknet `.cfg` file into typed layers.
 
 The text is a list of sections, `[net]` first and one section a layer after it, each followed by
-`option=value` lines. An option that could change what the network computes and that is not
-understood is an error: a network that is nearly the right one gives wrong boxes without a sound.
+`option=value` lines (`standoff.training.darknet.sections`). An option that could change what the network computes and
+that is not understood is an error: a network that is nearly the right one gives wrong boxes without a sound.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, Literal, TypeAlias, cast, get_args
+from typing import Final, TypeAlias
 
 from standoff.core.errors import ModelError
+from standoff.training.darknet.sections import Activation, Section, read_cfg_text, read_sections
 
-Activation = Literal["linear", "leaky", "logistic", "relu", "relu6"]
+_LOG = logging.getLogger(__name__)
 POINT_VALUES: Final = 4  # x and y, and the logarithms of their standard errors
 
 
@@ -54,10 +56,12 @@ class Shortcut:
 
 @dataclass(frozen=True, slots=True)
 class Route:
-    """Channels of the layers `sources`, one after another."""
+    """Channels of the layers `sources`, one after another: of each the part `group_id` of `groups` equal ones."""
 
     line: int
     sources: tuple[int, ...]
+    groups: int = 1
+    group_id: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +100,7 @@ class Yolo:
         classes: Number of classes.
         scale_xy: Stretches the box centre's sigmoid about its middle (`scale_x_y`).
         has_point: Each anchor also gives a ground point and its error (`ground_point`; Darknet itself has none).
+        new_coords: The convolution before it has the sigmoid, and a side is the anchor's times 4 raw^2, not exp(raw).
     """
 
     line: int
@@ -103,6 +108,7 @@ class Yolo:
     classes: int
     scale_xy: float
     has_point: bool = False
+    new_coords: bool = False
 
     @property
     def values(self) -> int:
@@ -123,6 +129,7 @@ class DarknetCfg:
         height_px: Input height.
         channels: Input channels.
         layers: In order; sources of routes and shortcuts are positions in this tuple.
+        warnings: What the text says twice and differently.
     """
 
     name: str
@@ -130,6 +137,7 @@ class DarknetCfg:
     height_px: int
     channels: int
     layers: tuple[Layer, ...]
+    warnings: tuple[str, ...] = ()
 
     @property
     def heads(self) -> tuple[Yolo, ...]:
@@ -146,116 +154,7 @@ class DarknetCfg:
         return f"layer {index}, [{type(layer).__name__.lower()}] at line {layer.line} of {self.name}"
 
 
-# They steer training or Darknet's own post-processing; the network computes the same without them.
-_TRAINING_OPTIONS: Final = frozenset(
-    {
-        "beta_nms",
-        "burnin_update",
-        "cls_normalizer",
-        "delta_normalizer",
-        "focal_loss",
-        "ignore_thresh",
-        "iou_loss",
-        "iou_normalizer",
-        "iou_thresh",
-        "iou_thresh_kind",
-        "jitter",
-        "label_smooth_eps",
-        "learning_rate",
-        "max",
-        "max_delta",
-        "nms_kind",
-        "obj_normalizer",
-        "objectness_smooth",
-        "random",
-        "resize",
-        "stopbackward",
-        "train_only_bn",
-        "truth_thresh",
-    }
-)
-
-
-@dataclass(slots=True)
-class _Section:
-    name: str
-    line: int
-    source: str
-    options: dict[str, tuple[str, int]] = field(default_factory=dict)
-    read: set[str] = field(default_factory=set)
-
-    def error(self, expected: str, found: str, line: int | None = None) -> ModelError:
-        where = f"in [{self.name}] at line {line or self.line} of {self.source}"
-        return ModelError(expected=f"{expected} {where}", found=found, fix="correct the cfg file")
-
-    def word(self, key: str, default: str) -> tuple[str, int]:
-        self.read.add(key)
-        return self.options.get(key, (default, self.line))
-
-    def numbers(self, key: str, default: str = "") -> tuple[float, ...]:
-        text, line = self.word(key, default)
-        try:
-            return tuple(float(part) for part in text.split(",") if part)
-        except ValueError:
-            raise self.error(f"numbers for '{key}'", f"'{text}'", line) from None
-
-    def number(self, key: str, default: float) -> float:
-        numbers = self.numbers(key, repr(default))
-        if len(numbers) != 1:
-            raise self.error(f"one number for '{key}'", f"{len(numbers)}", self.word(key, "")[1])
-        return numbers[0]
-
-    def integers(self, key: str) -> tuple[int, ...]:
-        numbers = self.numbers(key)
-        if not numbers or any(number != int(number) for number in numbers):
-            text, line = self.word(key, "")
-            raise self.error(f"whole numbers for '{key}'", f"'{text}'", line)
-        return tuple(int(number) for number in numbers)
-
-    def integer(self, key: str, default: int, *, at_least: int = 1) -> int:
-        number = self.number(key, default)
-        if number != int(number) or number < at_least:
-            text, line = self.word(key, "")
-            raise self.error(f"a whole number of at least {at_least} for '{key}'", f"'{text}'", line)
-        return int(number)
-
-    def activation(self, default: Activation) -> Activation:
-        name, line = self.word("activation", default)
-        if name not in get_args(Activation):
-            raise self.error(f"an activation of {', '.join(get_args(Activation))}", f"'{name}'", line)
-        return cast(Activation, name)
-
-    def refuse_unread(self) -> None:
-        for key in self.options.keys() - self.read - _TRAINING_OPTIONS:
-            raise self.error("only options that standoff understands", f"'{key}'", self.options[key][1])
-
-
-def _sections(text: str, source: str) -> Iterator[_Section]:
-    section: _Section | None = None
-    for line_number, raw in enumerate(text.splitlines(), start=1):
-        line = "".join(raw.split("#")[0].split())
-        if not line or line.startswith(";"):
-            continue
-        if line.startswith("["):
-            if section is not None:
-                yield section
-            section = _Section(line.strip("[]"), line_number, source)
-            continue
-        key, equals, value = line.partition("=")
-        if section is None or not equals:
-            raise ModelError(
-                expected=f"a [section] or option=value at line {line_number} of {source}",
-                found=f"'{line[:40]}'",
-                fix="give a Darknet cfg file",
-            )
-        if key in section.options:
-            raise section.error(f"'{key}' once", "it twice", line_number)
-        section.options[key] = (value, line_number)
-    if section is not None:
-        yield section
-
-
-def _source_index(section: _Section, key: str, value: int, index: int) -> int:
+def _source_index(section: Section, key: str, value: int, index: int) -> int:
     """Turn a layer number of the cfg, absolute or relative if negative, into a position."""
     source = value if value >= 0 else index + value
     if not 0 <= source < index:
@@ -263,7 +162,7 @@ def _source_index(section: _Section, key: str, value: int, index: int) -> int:
     return source
 
 
-def _convolutional(section: _Section, _index: int) -> Convolutional:
+def _convolutional(section: Section, _index: int) -> Convolutional:
     size = section.integer("size", 1)
     padding = section.integer("padding", 0, at_least=0)
     return Convolutional(
@@ -278,23 +177,27 @@ def _convolutional(section: _Section, _index: int) -> Convolutional:
     )
 
 
-def _shortcut(section: _Section, index: int) -> Shortcut:
+def _shortcut(section: Section, index: int) -> Shortcut:
     sources = section.integers("from")
     if len(sources) != 1:
         raise section.error("one layer for 'from'", f"{len(sources)}", section.word("from", "")[1])
     return Shortcut(section.line, _source_index(section, "from", sources[0], index), section.activation("linear"))
 
 
-def _route(section: _Section, index: int) -> Route:
+def _route(section: Section, index: int) -> Route:
     sources = (_source_index(section, "layers", value, index) for value in section.integers("layers"))
-    return Route(section.line, tuple(sources))
+    groups, group_id = section.integer("groups", 1), section.integer("group_id", 0, at_least=0)
+    if group_id >= groups:
+        line = section.word("group_id", "")[1]
+        raise section.error(f"a group_id from 0 to {groups - 1} (groups={groups})", f"{group_id}", line)
+    return Route(section.line, tuple(sources), groups, group_id)
 
 
-def _upsample(section: _Section, _index: int) -> Upsample:
+def _upsample(section: Section, _index: int) -> Upsample:
     return Upsample(section.line, section.integer("stride", 2))
 
 
-def _maxpool(section: _Section, _index: int) -> Maxpool:
+def _maxpool(section: Section, _index: int) -> Maxpool:
     stride = section.integer("stride", 1)
     size = section.integer("size", stride)
     padding = section.integer("padding", size - 1, at_least=0)
@@ -304,14 +207,14 @@ def _maxpool(section: _Section, _index: int) -> Maxpool:
     return Maxpool(section.line, size, stride, padding)
 
 
-def _dropout(section: _Section, _index: int) -> Dropout:
+def _dropout(section: Section, _index: int) -> Dropout:
     probability = section.number("probability", 0.5)
     if not 0 <= probability < 1:
         raise section.error("a probability of at least 0 and below 1", f"{probability:g}")
     return Dropout(section.line, probability)
 
 
-def _yolo(section: _Section, _index: int) -> Yolo:
+def _yolo(section: Section, _index: int) -> Yolo:
     sides = section.numbers("anchors")
     count = section.integer("num", len(sides) // 2 or 1)
     if not sides or len(sides) != 2 * count or min(sides) <= 0:
@@ -327,10 +230,11 @@ def _yolo(section: _Section, _index: int) -> Yolo:
         classes=section.integer("classes", 20),
         scale_xy=section.number("scale_x_y", 1.0),
         has_point=bool(section.integer("ground_point", 0, at_least=0)),
+        new_coords=bool(section.integer("new_coords", 0, at_least=0)),
     )
 
 
-_BUILDERS: Final[dict[str, Callable[[_Section, int], Layer]]] = {
+_BUILDERS: Final[dict[str, Callable[[Section, int], Layer]]] = {
     "convolutional": _convolutional,
     "shortcut": _shortcut,
     "route": _route,
@@ -356,7 +260,7 @@ def parse_cfg(text: str, name: str = "cfg") -> DarknetCfg:
     >>> cfg.heads[0].anchors_px
     ((4.0, 8.0),)
     """
-    sections = list(_sections(text, name))
+    sections = list(read_sections(text, name))
     if not sections or sections[0].name not in ("net", "network"):
         found = f"[{sections[0].name}]" if sections else "no section"
         raise ModelError(expected=f"[net] first in {name}", found=found, fix="give a Darknet cfg file")
@@ -369,32 +273,42 @@ def parse_cfg(text: str, name: str = "cfg") -> DarknetCfg:
         layers.append(builder(section, index))
         section.refuse_unread()
     cfg = DarknetCfg(
-        name, net.integer("width", 416), net.integer("height", 416), net.integer("channels", 3), tuple(layers)
+        name,
+        net.integer("width", 416),
+        net.integer("height", 416),
+        net.integer("channels", 3),
+        tuple(layers),
+        tuple(warning for section in sections for warning in section.warnings),
     )
     if len({head.values for head in cfg.heads}) != 1:
         counts = ", ".join(f"{head.classes}{' with point' * head.has_point}" for head in cfg.heads) or "no [yolo] layer"
         expected = f"[yolo] layers with one number of classes, all with a ground point or none, in {name}"
         raise ModelError(expected=expected, found=counts, fix="correct the cfg file")
+    _check_new_coords(cfg)
     return cfg
 
 
-def read_text(path: Path, what: str) -> str:
-    """Read one of Darknet's text files; `what` names it in the message.
-
-    Raises:
-        ModelError: It cannot be read.
-    """
-    try:
-        return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else "bytes that are not text"
-        raise ModelError(expected=f"{what} at {path}", found=reason, fix="check the path") from error
+def _check_new_coords(cfg: DarknetCfg) -> None:
+    """Refuse heads whose sigmoid is nowhere: early Darknets had it in the head, today's in the convolution before."""
+    for index, head in enumerate(cfg.layers):
+        before = cfg.layers[index - 1] if index else None
+        if not isinstance(head, Yolo) or not head.new_coords:
+            continue
+        if not isinstance(before, Convolutional) or before.activation != "logistic":
+            raise ModelError(
+                expected=f"a convolution with activation=logistic before new_coords=1, for {cfg.section(index)}",
+                found="none" if not isinstance(before, Convolutional) else f"activation={before.activation}",
+                fix="take the cfg file of a later Darknet",
+            )
 
 
 def read_cfg(path: Path) -> DarknetCfg:
-    """Read a Darknet cfg file.
+    """Read a Darknet cfg file; warn of what it says twice and differently.
 
     Raises:
         ModelError: It cannot be read, or see `parse_cfg`.
     """
-    return parse_cfg(read_text(path, "a Darknet cfg file"), path.name)
+    cfg = parse_cfg(read_cfg_text(path), path.name)
+    for warning in cfg.warnings:
+        _LOG.warning("%s", warning)
+    return cfg

@@ -13,7 +13,8 @@ from standoff.core.classes import names_by_line
 from standoff.core.errors import ModelError
 from standoff.files.whole import whole_file
 from standoff.stages.detect.model_card import INPUT_NAME, OUTPUT_NAME, POINTS_NAME, ModelCard, file_sha256
-from standoff.training.darknet.cfg import DarknetCfg, read_cfg, read_text
+from standoff.training.darknet.cfg import DarknetCfg, read_cfg
+from standoff.training.darknet.sections import read_names_text
 from standoff.training.darknet.shapes import check_input
 from standoff.training.required import require_packages
 
@@ -68,7 +69,7 @@ def read_names(path: Path, network: DarknetCfg) -> tuple[str, ...]:
         ModelError: It cannot be read, has an empty line between names, or another number of names than the network has
             classes.
     """
-    text = read_text(path, "a names file")
+    text = read_names_text(path)
     try:
         names = names_by_line(text)
     except ValueError as error:
@@ -88,12 +89,10 @@ def _write_onnx(cfg: DarknetCfg, weights: Path, card: ModelCard, path: Path) -> 
     import onnx
     import torch
 
-    from standoff.training.darknet.network import DarknetNetwork, DecodedNetwork, DecodedPoints
-    from standoff.training.darknet.weights import load_weights
+    from standoff.training.darknet.network import DecodedNetwork, DecodedPoints
+    from standoff.training.darknet.weights import load_network
 
-    network = DarknetNetwork(cfg)
-    load_weights(network, weights)
-    decoded = DecodedNetwork(network).eval()
+    decoded = DecodedNetwork(load_network(cfg, weights)).eval()
     has_point = cfg.heads[0].has_point
     picture = torch.zeros(1, cfg.channels, cfg.height_px, cfg.width_px)
     with torch.no_grad(), warnings.catch_warnings():

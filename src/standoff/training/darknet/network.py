@@ -10,7 +10,6 @@ from torch.nn import functional
 
 from standoff.training.darknet.cfg import (
     POINT_VALUES,
-    Activation,
     Convolutional,
     DarknetCfg,
     Dropout,
@@ -21,6 +20,7 @@ from standoff.training.darknet.cfg import (
     Upsample,
     Yolo,
 )
+from standoff.training.darknet.sections import Activation
 from standoff.training.darknet.shapes import Shape, layer_shapes
 
 _LEAKY_SLOPE = 0.1
@@ -42,6 +42,10 @@ def _activation(name: Activation) -> nn.Module:
             return nn.ReLU()
         case "relu6":
             return nn.ReLU6()
+        case "mish":
+            return nn.Mish()
+        case "swish":
+            return nn.SiLU()
 
 
 class ConvolutionBlock(nn.Module):
@@ -123,6 +127,12 @@ def _block(layer: Layer, channels: int) -> nn.Module:
             return nn.Identity()
 
 
+def _group(features: Tensor, route: Route) -> Tensor:
+    """Return the part of (B, C, H, W) that a route takes."""
+    count = features.shape[1] // route.groups
+    return features[:, route.group_id * count : (route.group_id + 1) * count]
+
+
 class DarknetNetwork(nn.Module):
     """The layers of a cfg, in order.
 
@@ -159,7 +169,7 @@ class DarknetNetwork(nn.Module):
         features = pictures
         for index, (layer, block) in enumerate(zip(self.cfg.layers, self.blocks, strict=True)):
             if isinstance(layer, Route):
-                features = torch.cat([kept[source] for source in layer.sources], dim=1)
+                features = torch.cat([_group(kept[source], layer) for source in layer.sources], dim=1)
             elif isinstance(layer, Shortcut):
                 features = features + kept[layer.source]
             features = block(features)
@@ -236,7 +246,8 @@ class _HeadDecoder(nn.Module):
 
     Source:
         Redmon and Farhadi, YOLOv3: An Incremental Improvement, section 2.1; scale_x_y is Bochkovskiy
-        et al., YOLOv4, section 3.3 ("eliminate grid sensitivity").
+        et al., YOLOv4, section 3.3 ("eliminate grid sensitivity"); new_coords is Wang et al., Scaled-YOLOv4, 2021, as
+        Darknet computes it.
     """
 
     cell: Tensor
@@ -257,9 +268,14 @@ class _HeadDecoder(nn.Module):
         anchors, values, boxes = len(self.head.anchors_px), self.head.values, 5 + self.head.classes
         height, width = self.shape.height, self.shape.width
         raw = raw.reshape(-1, anchors, values, height, width).permute(0, 3, 4, 1, 2)
-        centre_px = (torch.sigmoid(raw[..., 0:2]) * self.head.scale_xy + self.cell) * self.cell_px
-        size_px = torch.exp(raw[..., 2:4]) * self.anchors_px
-        decoded = torch.cat([centre_px, size_px, torch.sigmoid(raw[..., 4:boxes])], dim=-1)
+        if self.head.new_coords:
+            shares, factors, probability = raw[..., 0:2], 4.0 * raw[..., 2:4].square(), raw[..., 4:boxes]
+        else:
+            shares, factors = torch.sigmoid(raw[..., 0:2]), torch.exp(raw[..., 2:4])
+            probability = torch.sigmoid(raw[..., 4:boxes])
+        centre_px = (shares * self.head.scale_xy + self.cell) * self.cell_px
+        size_px = factors * self.anchors_px
+        decoded = torch.cat([centre_px, size_px, probability], dim=-1)
         decoded = decoded.reshape(-1, height * width * anchors, boxes)
         if not self.head.has_point:
             return decoded, decoded[..., :0]

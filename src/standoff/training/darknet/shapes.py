@@ -8,6 +8,9 @@ from fractions import Fraction
 from standoff.core.errors import ModelError
 from standoff.training.darknet.cfg import Convolutional, DarknetCfg, Layer, Maxpool, Route, Shortcut, Upsample, Yolo
 
+_LARGEST_INPUT_PX = 8192
+"""Twice the width of 4K: no network was trained for more, and a misprint should not fill the memory."""
+
 
 @dataclass(frozen=True, slots=True)
 class Shape:
@@ -34,12 +37,16 @@ def _windowed(before: Shape, channels: int, size: int, stride: int, padding: int
     )
 
 
-def _routed(cfg: DarknetCfg, index: int, sources: list[Shape]) -> Shape:
+def _routed(cfg: DarknetCfg, index: int, groups: int, sources: list[Shape]) -> Shape:
     sizes = sorted({(source.width, source.height) for source in sources})
     if len(sizes) != 1:
         found = " and ".join(f"{width}x{height}" for width, height in sizes)
         raise _misfit(cfg, index, "layers of one size", found)
-    return Shape(sum(source.channels for source in sources), sources[0].height, sources[0].width)
+    channels = [source.channels for source in sources]
+    if any(count % groups for count in channels):
+        found = " and ".join(map(str, channels))
+        raise _misfit(cfg, index, f"channels that {groups} groups divide", found)
+    return Shape(sum(channels) // groups, sources[0].height, sources[0].width)
 
 
 def _convolved(cfg: DarknetCfg, index: int, layer: Convolutional, before: Shape) -> Shape:
@@ -65,8 +72,8 @@ def _next_shape(cfg: DarknetCfg, index: int, before: Shape, shapes: list[Shape])
             return _windowed(before, before.channels, size, stride, padding)
         case Upsample(stride=stride):
             return Shape(before.channels, before.height * stride, before.width * stride)
-        case Route(sources=sources):
-            return _routed(cfg, index, [shapes[source] for source in sources])
+        case Route(sources=sources, groups=groups):
+            return _routed(cfg, index, groups, [shapes[source] for source in sources])
         case Shortcut(source=source) if shapes[source] != before:
             raise _misfit(cfg, index, f"a layer of {before}", f"{shapes[source]}")
         case Yolo() as head:
@@ -116,21 +123,25 @@ def largest_stride(cfg: DarknetCfg) -> int:
     return int(max(layer_strides(cfg)))
 
 
-def weights_numbers(cfg: DarknetCfg) -> int:
-    r"""Return how many numbers a weights file of all layers holds.
+def numbers_by_layer(cfg: DarknetCfg) -> dict[int, int]:
+    r"""Return how many numbers of a weights file belong to each layer that has any, in the file's order.
 
     >>> from standoff.training.darknet.cfg import parse_cfg
-    >>> weights_numbers(parse_cfg("[net]\n[convolutional]\nfilters=7\n[yolo]\nanchors=1,1\nclasses=2"))
-    28
+    >>> numbers_by_layer(parse_cfg("[net]\n[convolutional]\nfilters=7\n[yolo]\nanchors=1,1\nclasses=2"))
+    {0: 28}
     """
     shapes = layer_shapes(cfg)
     before = (cfg.channels, *(shape.channels for shape in shapes))
-    total = 0
-    for layer, channels in zip(cfg.layers, before, strict=False):
-        if isinstance(layer, Convolutional):
-            kernels = layer.filters * layer.size**2 * channels // layer.groups
-            total += kernels + layer.filters * (4 if layer.batch_normalized else 1)
-    return total
+    return {
+        index: layer.filters * (layer.size**2 * channels // layer.groups + (4 if layer.batch_normalized else 1))
+        for index, (layer, channels) in enumerate(zip(cfg.layers, before, strict=False))
+        if isinstance(layer, Convolutional)
+    }
+
+
+def weights_numbers(cfg: DarknetCfg) -> int:
+    """Return how many numbers a weights file of all layers holds."""
+    return sum(numbers_by_layer(cfg).values())
 
 
 def check_input(network: DarknetCfg) -> None:
@@ -147,6 +158,12 @@ def check_input(network: DarknetCfg) -> None:
         )
     stride = largest_stride(network)
     size_px = network.width_px, network.height_px
+    if max(size_px) > _LARGEST_INPUT_PX:
+        raise ModelError(
+            expected=f"an input of at most {_LARGEST_INPUT_PX} px a side",
+            found=f"{size_px[0]}x{size_px[1]}",
+            fix="take a smaller one, and slice the picture (detect.slices)",
+        )
     if min(size_px) < stride or size_px[0] % stride or size_px[1] % stride:
         width_px, height_px = (max(stride, round(side / stride) * stride) for side in size_px)
         raise ModelError(

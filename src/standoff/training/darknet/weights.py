@@ -17,8 +17,11 @@ import torch
 from torch import Tensor
 
 from standoff.core.errors import ModelError
+from standoff.files.lfs import refuse_pointer
 from standoff.files.whole import whole_file
+from standoff.training.darknet.cfg import DarknetCfg
 from standoff.training.darknet.network import ConvolutionBlock, DarknetNetwork
+from standoff.training.darknet.shapes import numbers_by_layer
 
 Numbers: TypeAlias = np.ndarray[tuple[int], np.dtype[np.float32]]
 
@@ -88,8 +91,9 @@ def read_numbers(path: Path) -> tuple[WeightsHeader, Numbers]:
     """Read a weights file without knowing what network it belongs to.
 
     Raises:
-        ModelError: It cannot be read, or is cut within its header or a number.
+        ModelError: It cannot be read, is a Git LFS pointer, or is cut within its header or a number.
     """
+    refuse_pointer(path, f"a Darknet weights file at {path}", ModelError)
     try:
         content = path.read_bytes()
     except OSError as error:
@@ -97,6 +101,19 @@ def read_numbers(path: Path) -> tuple[WeightsHeader, Numbers]:
             expected=f"a Darknet weights file at {path}", found=error.strerror or "no file", fix="check the path"
         ) from error
     return _split(content, path)
+
+
+def load_network(cfg: DarknetCfg, path: Path) -> DarknetNetwork:
+    """Build a network from its cfg and its weights; nothing is built unless the file holds what the cfg asks for.
+
+    Raises:
+        ModelError: As `load_weights`; or layers do not fit each other.
+    """
+    _, numbers = read_numbers(path)
+    _check_length(cfg, len(numbers), path.name)
+    network = DarknetNetwork(cfg)
+    fill_convolutions(network, numbers, path.name)
+    return network
 
 
 def load_weights(network: DarknetNetwork, path: Path) -> WeightsHeader:
@@ -130,6 +147,8 @@ def fill_convolutions(network: DarknetNetwork, numbers: Numbers, file_name: str,
     Raises:
         ModelError: The numbers do not fit; says at which layer.
     """
+    if not may_end_early:
+        _check_length(network.cfg, len(numbers), file_name)
     position = 0
     for filled, (index, block) in enumerate(network.convolutions()):
         parameters = _parameters(block)
@@ -138,21 +157,39 @@ def fill_convolutions(network: DarknetNetwork, numbers: Numbers, file_name: str,
         if len(own) == 0 and may_end_early and filled:
             return filled
         if len(own) < needed:
-            raise ModelError(
-                expected=f"{needed} numbers in {file_name} for {network.cfg.section(index)}",
-                found=f"{len(own)} left",
-                fix="give the weights that belong to this cfg",
-            )
+            raise _too_few(network.cfg, index, needed, len(own), file_name)
         _refuse_impossible(own, block, f"{file_name} for {network.cfg.section(index)}")
         _fill(parameters, own)
         position += needed
     if position < len(numbers):
-        raise ModelError(
-            expected=f"{position} numbers in {file_name} for all layers of {network.cfg.name}",
-            found=f"{len(numbers)}, {len(numbers) - position} too many",
-            fix="give the weights that belong to this cfg",
-        )
+        raise _too_many(network.cfg, position, len(numbers), file_name)
     return len(network.convolutions())
+
+
+def _check_length(cfg: DarknetCfg, count: int, file_name: str) -> None:
+    left = count
+    for index, needed in numbers_by_layer(cfg).items():
+        if left < needed:
+            raise _too_few(cfg, index, needed, left, file_name)
+        left -= needed
+    if left:
+        raise _too_many(cfg, count - left, count, file_name)
+
+
+def _too_few(cfg: DarknetCfg, index: int, needed: int, left: int, file_name: str) -> ModelError:
+    return ModelError(
+        expected=f"{needed} numbers in {file_name} for {cfg.section(index)}",
+        found=f"{left} left",
+        fix="give the weights that belong to this cfg",
+    )
+
+
+def _too_many(cfg: DarknetCfg, needed: int, count: int, file_name: str) -> ModelError:
+    return ModelError(
+        expected=f"{needed} numbers in {file_name} for all layers of {cfg.name}",
+        found=f"{count}, {count - needed} too many",
+        fix="give the weights that belong to this cfg",
+    )
 
 
 def _refuse_impossible(numbers: Numbers, block: ConvolutionBlock, where: str) -> None:

