@@ -94,7 +94,7 @@ def test_wrong_settings_are_one_line_that_says_where_and_what(tmp_path: Path, te
 
 
 def test_a_settings_file_that_is_not_there_is_one_line(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match="No such file"):
+    with pytest.raises(ConfigError, match="no such file"):
         load_settings(tmp_path / "none.yaml")
 
 

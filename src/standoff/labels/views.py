@@ -18,6 +18,8 @@ from standoff.core.camera import Camera, Lens
 from standoff.core.errors import DataError
 from standoff.core.homography import FloatArray
 from standoff.core.pose import View
+from standoff.files.json_text import parse_json
+from standoff.files.plain_text import read_text
 
 VIEWS_FILE: Final = "views.jsonl"
 
@@ -62,9 +64,9 @@ def read_views(path: Path) -> dict[str, GroundView]:
         DataError: A line is something else.
     """
     views = {}
-    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
+    for number, line in enumerate(read_text(path, "the views of a set").splitlines(), start=1):
+        entry = parse_json(line, "a camera", f"line {number} of {path}")
         try:
-            entry = json.loads(line)
             views[str(entry["picture"])] = _ground_view(entry)
         except (KeyError, TypeError, ValueError) as error:
             raise DataError(

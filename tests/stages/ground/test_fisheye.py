@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-import pytest
 from drawn_ground import frame
 from drawn_solid import SIZE_PX, box_around, drawn, lens, looking_at
 from tolerances import FISHEYE_REL, FITTED_M, GROUND_THROUGH_LENS_M
@@ -25,7 +24,7 @@ from standoff.stages.ground import (
     belief_from_points,
 )
 from standoff.stages.ground.edges import Edges
-from standoff.stages.ground.marker_fit import first_fit
+from standoff.stages.ground.marker_fit import PointFit, first_fit
 from standoff.stages.ground.size_scale import size_ratios
 from standoff.stages.ground.sizes import FISHEYE, NoSizes, SizesEstimator
 from standoff.stages.ground.solid import SolidState
@@ -97,7 +96,7 @@ def test_corners_give_the_camera_s_place() -> None:
     prior = CameraPrior.calibrated(CAMERA)
     np.testing.assert_allclose(belief_from_points(prior, seen).state.view.position_m, view.position_m, atol=FITTED_M)
     by_marker = first_fit([seen], CAMERA, level_prior(prior), 0.01)
-    assert by_marker
+    assert isinstance(by_marker, PointFit)
     np.testing.assert_allclose(by_marker.view.position_m, view.position_m, atol=FITTED_M)
 
 

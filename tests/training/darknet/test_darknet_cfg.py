@@ -85,7 +85,7 @@ def test_a_missing_and_a_binary_file_are_refused_in_one_line(tmp_path: Path) -> 
     with pytest.raises(ModelError, match=re.escape(str(tmp_path / "none.cfg"))):
         read_cfg(tmp_path / "none.cfg")
     (tmp_path / "binary.cfg").write_bytes(b"\xff\xfe\x00\x80")
-    with pytest.raises(ModelError, match="not text"):
+    with pytest.raises(ModelError, match="UTF-16"):
         read_cfg(tmp_path / "binary.cfg")
 
 

@@ -24,10 +24,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final, Literal, get_args
 
-import yaml
-
-from standoff.core.classes import names_by_line
+from standoff.core.classes import names_by_line, names_in_list
 from standoff.core.errors import ModelError
+from standoff.files.plain_text import read_text
+from standoff.files.yaml_text import read_yaml
 from standoff.stages.detect.letterbox import DARKNET, Colour, Placement, Preprocessing
 
 Family = Literal["yolov3", "yolox", "detr"]
@@ -72,7 +72,7 @@ def read_interface(path: Path, graph_size_px: tuple[int, int] | None) -> Interfa
     """
     try:
         return _interface(_parsed(path), graph_size_px, path)
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, ValueError) as error:
+    except ValueError as error:
         raise ModelError(
             expected=f"the description of a detector in {path}",
             found=str(error),
@@ -81,7 +81,7 @@ def read_interface(path: Path, graph_size_px: tuple[int, int] | None) -> Interfa
 
 
 def _parsed(path: Path) -> dict[str, Any]:
-    content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    content = read_yaml(path, "the description of a detector", ModelError)
     if not isinstance(content, dict):
         raise ValueError("no `key: value` lines")
     unknown = [str(key) for key in content if key not in _READERS]
@@ -111,7 +111,7 @@ def _interface(said: dict[str, Any], graph_size_px: tuple[int, int] | None, path
 
 
 def _labels(path: Path) -> tuple[str, ...]:
-    labels = names_by_line(path.read_text(encoding="utf-8"))
+    labels = names_by_line(read_text(path, "a file of labels", ModelError))
     if not labels:
         raise ValueError(f"no label in {path.name}")
     return labels
@@ -124,9 +124,9 @@ def _times(size_px: tuple[int, int]) -> str:
 def _classes(key: str, value: object) -> str | tuple[str, ...]:
     if isinstance(value, str):
         return value
-    if not isinstance(value, list) or not value or any(isinstance(label, dict | list | None) for label in value):
+    if not isinstance(value, list) or not value:
         raise ValueError(f"{key} that are neither a list of labels nor a file's name")
-    return tuple(str(label) for label in value)
+    return names_in_list(value)
 
 
 def _size(key: str, value: object) -> tuple[int, int]:

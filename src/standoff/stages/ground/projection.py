@@ -25,8 +25,8 @@ Eye = tuple[FloatArray, FloatArray, FloatArray, FloatArray, float]
 def eye_of(view: View) -> Eye:
     """Return what compiled loops take for a view.
 
-    That is its position (3,), its rotation (3, 3), its camera matrix (3, 3), its distortion (5,) or (4,), and the square of
-    the radius at which the lens's polynomial first turns back.
+    That is its position (3,), its rotation (3, 3), its camera matrix (3, 3), its distortion (5,) or (4,), and the
+    square of the radius at which the lens's polynomial first turns back.
     """
     camera = view.camera
     return view.position_m, view.site_to_camera, camera.matrix, camera.distortion, camera.first_fold_r2()

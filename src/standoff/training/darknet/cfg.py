@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Final, Literal, TypeAlias, cast, get_args
 
 from standoff.core.errors import ModelError
+from standoff.files.plain_text import read_text
 
 Activation = Literal["linear", "leaky", "logistic", "relu", "relu6"]
 POINT_VALUES: Final = 4  # x and y, and the logarithms of their standard errors
@@ -378,23 +379,10 @@ def parse_cfg(text: str, name: str = "cfg") -> DarknetCfg:
     return cfg
 
 
-def read_text(path: Path, what: str) -> str:
-    """Read one of Darknet's text files; `what` names it in the message.
-
-    Raises:
-        ModelError: It cannot be read.
-    """
-    try:
-        return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else "bytes that are not text"
-        raise ModelError(expected=f"{what} at {path}", found=reason, fix="check the path") from error
-
-
 def read_cfg(path: Path) -> DarknetCfg:
     """Read a Darknet cfg file.
 
     Raises:
         ModelError: It cannot be read, or see `parse_cfg`.
     """
-    return parse_cfg(read_text(path, "a Darknet cfg file"), path.name)
+    return parse_cfg(read_text(path, "a Darknet cfg file", ModelError), path.name)

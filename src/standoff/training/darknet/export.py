@@ -11,9 +11,10 @@ from pathlib import Path
 
 from standoff.core.classes import names_by_line
 from standoff.core.errors import ModelError
+from standoff.files.plain_text import read_text
 from standoff.files.whole import whole_file
 from standoff.stages.detect.model_card import INPUT_NAME, OUTPUT_NAME, POINTS_NAME, ModelCard, file_sha256
-from standoff.training.darknet.cfg import DarknetCfg, read_cfg, read_text
+from standoff.training.darknet.cfg import DarknetCfg, read_cfg
 from standoff.training.darknet.shapes import check_input
 from standoff.training.required import require_packages
 
@@ -68,7 +69,7 @@ def read_names(path: Path, network: DarknetCfg) -> tuple[str, ...]:
         ModelError: It cannot be read, has an empty line between names, or another number of names than the network has
             classes.
     """
-    text = read_text(path, "a names file")
+    text = read_text(path, "a names file", ModelError)
     try:
         names = names_by_line(text)
     except ValueError as error:

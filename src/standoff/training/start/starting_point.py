@@ -8,13 +8,14 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from standoff.core.errors import ConfigError
+from standoff.core.errors import ConfigError, ModelError
 from standoff.core.homography import FloatArray
+from standoff.files.plain_text import read_text
 from standoff.labels import LabelledData
 from standoff.training.architectures import ARCHITECTURES
 from standoff.training.architectures.composer import Anchors
 from standoff.training.architectures.refitted import pointed_cfg, refitted_cfg
-from standoff.training.darknet.cfg import DarknetCfg, parse_cfg, read_cfg, read_text
+from standoff.training.darknet.cfg import DarknetCfg, parse_cfg, read_cfg
 from standoff.training.darknet.export import read_names
 from standoff.training.darknet.network import DarknetNetwork
 from standoff.training.darknet.shapes import layer_strides
@@ -75,7 +76,9 @@ def compose_cfg(arch: str, data: LabelledData, params: TrainParams, weights: Pat
     else:
         by_stride = dict(zip(sorted(strides), fine_to_coarse, strict=True))
         anchors_px: Anchors = [by_stride[stride] for stride in strides]
-        text = refitted_cfg(read_text(Path(arch), "a Darknet cfg"), len(data.classes), params.size_px, anchors_px)
+        text = refitted_cfg(
+            read_text(Path(arch), "a Darknet cfg", ModelError), len(data.classes), params.size_px, anchors_px
+        )
     return pointed_cfg(text) if _marks_points(data) or _gives_points(weights) else text
 
 
@@ -110,7 +113,7 @@ def _strides(arch: str) -> tuple[int, ...]:
             found=f"'{arch}'",
             fix="correct --arch",
         )
-    cfg = parse_cfg(read_text(path, "a Darknet cfg"), path.name)
+    cfg = parse_cfg(read_text(path, "a Darknet cfg", ModelError), path.name)
     heads = {id(head) for head in cfg.heads}
     return tuple(
         int(stride) for layer, stride in zip(cfg.layers, layer_strides(cfg), strict=True) if id(layer) in heads
