@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import cv2
 import numpy as np
 from drawn_ground import frame
@@ -12,6 +14,7 @@ from standoff.core.camera import Camera, CameraPrior
 from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.pose import View
 from standoff.core.types import Detections, GroundMap, NoCameraMotion
+from standoff.labels.views import GroundView, read_views, view_line
 from standoff.stages.ground import (
     FusedGround,
     GivenPlace,
@@ -135,3 +138,11 @@ def test_people_do_not_measure_the_ground_and_judge_it_near_the_axis_only() -> N
     view = View.aimed(CAMERA, np.array([0.0, 0.0, 12.0]), heading_deg=0.0, pitch_deg=80.0)
     log_ratio, _ = size_ratios(view, boxes, np.full(2, worker))
     assert np.isfinite(log_ratio).tolist() == [True, False]
+
+
+def test_a_set_s_views_keep_the_lens(tmp_path: Path) -> None:
+    view = _off_axis(0.0).view
+    (tmp_path / "views.jsonl").write_text(view_line("a.jpg", GroundView(view, 0.0)))
+    again = read_views(tmp_path / "views.jsonl")["a.jpg"]
+    seen_px = view.project(PLACES_M[:3])
+    np.testing.assert_allclose(again.to_ground(seen_px), PLACES_M[:3, :2], atol=GROUND_THROUGH_LENS_M)
