@@ -77,7 +77,7 @@ def picture(ground_to_image: FloatArray, corners_m: FloatArray, camera: Camera, 
     x = (np.arange(width)[:, None] + steps).ravel()
     y = (np.arange(height)[:, None] + steps).ravel()
     rays = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    if camera.distortion.any():
+    if camera.bends:
         rays = camera.undistort(rays)
     ground, seen = homography.apply(homography.invert(ground_to_image), rays)
     ground = np.where(seen[:, None], ground, 1e6)

@@ -1,11 +1,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
 import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+from laws import examples
+from mutations import mutated
 
-from standoff.config import Settings, build_ground, build_pipeline, load_settings, resolved
+from standoff.config import Settings, build_ground, build_pipeline, build_stage, load_settings, resolved
 from standoff.core.errors import ConfigError, GroundError
 from standoff.core.types import Detections, Frame
 from standoff.stages.ground import FusedGround, ScaleWatch, Unmapped
@@ -94,7 +99,7 @@ def test_wrong_settings_are_one_line_that_says_where_and_what(tmp_path: Path, te
 
 
 def test_a_settings_file_that_is_not_there_is_one_line(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match="No such file"):
+    with pytest.raises(ConfigError, match="no such file"):
         load_settings(tmp_path / "none.yaml")
 
 
@@ -253,3 +258,54 @@ def test_a_misspelt_variable_is_refused_with_the_nearest_name(
     with pytest.raises(ConfigError) as caught:
         load_settings()
     assert f"found {variable}." in str(caught.value) and nearest in str(caught.value)
+
+
+def test_a_settings_file_with_a_name_twice_is_refused_with_both_lines(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"line 3: the key `every` a second time, after line 1"):
+        load_settings(write(tmp_path, "every: 2\nmodel: site\nevery: 3\n"))
+
+
+def test_numbers_in_a_settings_file_are_what_they_say_or_refused(tmp_path: Path) -> None:
+    assert load_settings(write(tmp_path, "track: {max_lost_s: 1e1}\n")).track.max_lost_s == 10.0
+    with pytest.raises(ConfigError, match="max_lost_s"):
+        load_settings(write(tmp_path, "track: {max_lost_s: 12:30}\n"))
+
+
+def test_a_settings_file_of_another_editor_is_read_or_its_encoding_named(tmp_path: Path) -> None:
+    path = tmp_path / "site.yaml"
+    path.write_bytes(b"\xef\xbb\xbfevery: 2\r\n")
+    assert load_settings(path).every == 2
+    path.write_bytes("every: 2\n".encode("utf-16"))
+    with pytest.raises(ConfigError, match="UTF-16"):
+        load_settings(path)
+
+
+_FILE = b"""every: 2
+model: site
+ground:
+  camera: camera.yaml
+  reference: {corners_m: [[0, 0], [2.9, 0], [2.9, 2.9], [0, 2.9]], height_m: 0.4, box_px: [546, 386, 691, 510]}
+track: {max_coast_s: 3.0, confirm_hits: 5}
+proximity: {pairs: [[worker, excavator]]}
+"""
+
+
+@examples(200)
+@given(mutated(st.just(_FILE)))
+def test_a_damaged_settings_file_is_settings_or_one_line(content: bytes) -> None:
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "site.yaml"
+        path.write_bytes(content)
+        try:
+            load_settings(path)
+        except ConfigError as error:
+            assert "\n" not in str(error)
+
+
+def test_the_survey_s_own_camera_removes_the_lens_from_the_motion_too(tmp_path: Path) -> None:
+    size = "width_px: 640\nheight_px: 480\n"
+    (tmp_path / "camera.yaml").write_text(size + "fx: 300\nfy: 300\ncx: 320\ncy: 240\nlens: fisheye\nk1: -0.02\n")
+    points = "".join(f"- {{px: [{x}, {y}], m: [{x / 50}, {-y / 40}]}}\n" for x in (100, 500) for y in (100, 400))
+    (tmp_path / "survey.yaml").write_text(f"image_size_px: [640, 480]\ncamera: camera.yaml\npoints:\n{points}")
+    settings = load_settings(write(tmp_path, "ground: {survey: survey.yaml}\n"))
+    assert build_stage("motion", settings).description["lens_distortion_removed"]

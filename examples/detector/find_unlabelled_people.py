@@ -18,7 +18,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 import numpy.typing as npt
-import yaml
+
+from standoff.files.yaml_text import dump_yaml
 
 Picture = npt.NDArray[np.uint8]
 Matrix = npt.NDArray[np.float64]
@@ -126,4 +127,4 @@ def _moving(picture: Picture, empty: Picture, vehicles: Matrix) -> list[list[flo
 
 
 if __name__ == "__main__":
-    Path(sys.argv[2]).write_text(yaml.safe_dump(find_regions(Path(sys.argv[1])), default_flow_style=None))
+    Path(sys.argv[2]).write_text(dump_yaml(find_regions(Path(sys.argv[1])), flow=None))

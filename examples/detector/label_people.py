@@ -13,7 +13,8 @@ import sys
 from pathlib import Path
 
 import cv2
-import yaml
+
+from standoff.files.yaml_text import dump_yaml, read_yaml
 
 NAMES = ("car", "truck", "bus", "minibus", "cyclist", "person")
 
@@ -21,7 +22,7 @@ NAMES = ("car", "truck", "bus", "minibus", "cyclist", "person")
 def main() -> None:
     """Write both sets."""
     source, marks, moving, out = (Path(argument) for argument in sys.argv[1:])
-    marked = yaml.safe_load(marks.read_text())
+    marked = read_yaml(marks, "marked people")
     for name in ("streets", "flights"):
         for kind in ("images", "labels"):
             (out / name / kind).mkdir(parents=True, exist_ok=True)
@@ -39,12 +40,13 @@ def main() -> None:
                 sys.exit(f"cannot read {picture}")
             rows += [_row(box, image.shape[1], image.shape[0]) for box in people["people"]]
         (folder / "labels" / f"{picture.stem}.txt").write_text("\n".join(rows) + "\n")
+    moves = read_yaml(moving, "boxes of what moves")
     unknown = {
         "streets": {stem: people["unknown"] for stem, people in marked.items()},
-        "flights": {stem: boxes for stem, boxes in yaml.safe_load(moving.read_text()).items() if stem not in marked},
+        "flights": {stem: boxes for stem, boxes in moves.items() if stem not in marked},
     }
     for name, regions in unknown.items():
-        (out / name / "ignore.yaml").write_text(yaml.safe_dump(regions))
+        (out / name / "ignore.yaml").write_text(dump_yaml(regions))
 
 
 def _row(box: list[float], width_px: int, height_px: int) -> str:

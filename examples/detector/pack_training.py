@@ -27,12 +27,11 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-import yaml
-
 from standoff import __version__
 from standoff.core.errors import ConfigError, DataError, MissingDependency, ModelError, OutputError, StandoffError
 from standoff.files.json_text import plain
 from standoff.files.whole import whole_file
+from standoff.files.yaml_text import dump_yaml
 from standoff.labels import LabelledData, read_data
 from standoff.labels.documents import read_yaml, resolve_path
 from standoff.labels.mixture import is_mixture, read_mixture
@@ -243,8 +242,8 @@ def pack_plan(config: Path, pack: Pack, *, is_recipe: bool) -> dict[str, Any]:
         require_splits(data, ("train", "val"))
         mixture = pack_mixture(plan.data, pack)
         facts["pictures"] = {split: len(pictures) for split, pictures in data.splits.items()}
-    pack.texts["plan.yaml"] = yaml.safe_dump(packed, sort_keys=False)
-    pack.texts["mixture.yaml"] = yaml.safe_dump(plain(mixture), sort_keys=False, allow_unicode=True)
+    pack.texts["plan.yaml"] = dump_yaml(packed)
+    pack.texts["mixture.yaml"] = dump_yaml(plain(mixture))
     if not is_recipe:
         check_moved(pack, data)
     return facts

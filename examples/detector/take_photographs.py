@@ -17,7 +17,8 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-import yaml
+
+from standoff.files.yaml_text import dump_yaml, read_yaml
 
 SQUEEZED = "rf100"
 MOST_STRETCH = 1.8
@@ -28,10 +29,10 @@ SAME_PX = 1.0
 def main() -> None:
     """Write the three sets."""
     source, points, out = (Path(argument) for argument in sys.argv[1:])
-    marked = yaml.safe_load(points.read_text())
+    marked = read_yaml(points, "marked points")
     regions: dict[str, dict[str, list[list[float]]]] = {}
     for folder in sorted(path for path in source.iterdir() if path.is_dir()):
-        ignored = yaml.safe_load((folder / "ignore.yaml").read_text()) or {}
+        ignored = read_yaml(folder / "ignore.yaml", "regions to ignore") or {}
         held_out = sorted(_listed(folder / "val.txt"))
         parts = {
             "photographs": sorted(_listed(folder / "train.txt")),
@@ -51,7 +52,7 @@ def main() -> None:
         for name in parts:
             (out / name / "classes.txt").write_text(names)
     for name, boxes in regions.items():
-        (out / name / "ignore.yaml").write_text(yaml.safe_dump(boxes))
+        (out / name / "ignore.yaml").write_text(dump_yaml(boxes))
 
 
 def _listed(file: Path) -> list[Path]:

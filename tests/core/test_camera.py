@@ -5,18 +5,24 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tolerances import DISTORTION_PX, GEOMETRY_REL, ITERATED_INVERSE_PX
+from tolerances import DISTORTION_PX, GEOMETRY_REL, ITERATED_INVERSE_PX, NUMERICAL_DERIVATIVE_REL
 
-from standoff.core.camera import DRONE_FIELD_DEG, Camera, CameraPrior
+from standoff.core.camera import DRONE_FIELD_DEG, Camera, CameraPrior, RadialDistortion
 from standoff.core.homography import FloatArray
 
 _MATRIX = np.array([[535.9, 0.0, 342.3], [0.0, 536.4, 235.6], [0.0, 0.0, 1.0]])
 _LENS = np.array([-0.2664, -0.0386, 0.00178, -0.00028, 0.2384])
+_HALF_CENTRE = np.array([[0.0, 0.0, 171.15], [0.0, 0.0, 117.8], [0.0, 0.0, 0.0]])
+_FISHEYE = np.array([-0.02, 0.01, -0.004, 0.001])
 _INSIDE = (st.floats(0.0, 639.0), st.floats(0.0, 479.0))
 
 
 def lens_camera() -> Camera:
     return Camera(640, 480, _MATRIX, _LENS)
+
+
+def fisheye_camera() -> Camera:
+    return Camera(640, 480, _MATRIX * np.array([[0.5], [0.5], [1.0]]) + _HALF_CENTRE, _FISHEYE, "fisheye")
 
 
 def picture_grid(step: int = 20) -> FloatArray:
@@ -99,6 +105,7 @@ def test_another_shape_of_picture_is_refused() -> None:
         (_MATRIX * np.nan, np.zeros(5)),
         (_MATRIX, np.full(5, np.inf)),
         (np.diag([-500.0, 500.0, 1.0]), np.zeros(5)),
+        (_MATRIX, np.zeros(4)),
     ],
 )
 def test_a_camera_that_cannot_be_is_refused(matrix: FloatArray, distortion: FloatArray) -> None:
@@ -163,3 +170,63 @@ def test_what_is_known_of_a_camera_scales_with_the_picture_and_keeps_its_errors(
     assert (half.focal_sigma, half.k1_sigma, half.origin) == (prior.focal_sigma, prior.k1_sigma, prior.origin)
     with pytest.raises(ValueError, match="aspect"):
         prior.scaled_to(320, 320)
+
+
+def test_a_fisheye_is_opencvs_all_over_the_picture() -> None:
+    camera, points_px = fisheye_camera(), picture_grid()
+    stop = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 100, 1e-12)
+    opencv = cv2.fisheye.undistortPoints(points_px[:, None], camera.matrix, _FISHEYE, P=camera.matrix, criteria=stop)
+    undistorted = camera.undistort(points_px)
+    np.testing.assert_allclose(undistorted, opencv[:, 0], rtol=GEOMETRY_REL)
+    np.testing.assert_allclose(camera.distort(undistorted), points_px, atol=DISTORTION_PX)
+    rays = (undistorted - camera.matrix[:2, 2]) / np.diag(camera.matrix)[:2]
+    seen = cv2.fisheye.distortPoints(rays[:, None], camera.matrix, _FISHEYE)[:, 0]
+    np.testing.assert_allclose(seen, points_px, atol=DISTORTION_PX)
+    # A pinhole camera would put the corner elsewhere by more than half the picture.
+    assert np.abs(undistorted - points_px).max() > 320.0
+
+
+@given(st.floats(-4000.0, 4000.0), st.floats(-4000.0, 4000.0), st.lists(st.floats(-0.4, 0.4), min_size=4, max_size=4))
+def test_a_fisheye_of_any_coefficients_says_nan_or_what_is_true(x: float, y: float, k: list[float]) -> None:
+    camera, point_px = Camera(640, 480, fisheye_camera().matrix, np.array(k), "fisheye"), np.array([[x, y]])
+    undistorted = camera.undistort(point_px)
+    if not np.isnan(undistorted).any():
+        rays = (undistorted - camera.matrix[:2, 2]) / np.diag(camera.matrix)[:2]
+        seen = cv2.fisheye.distortPoints(rays[:, None], camera.matrix, camera.distortion)[:, 0]
+        # Near 90 degrees off the axis a pixel of the ideal picture is a billionth of one of the fisheye's.
+        np.testing.assert_allclose(seen, point_px, atol=ITERATED_INVERSE_PX)
+
+
+def test_a_fisheye_shows_nothing_of_an_ideal_picture_from_90_degrees_off_its_axis_on() -> None:
+    camera = Camera(640, 480, fisheye_camera().matrix, np.zeros(4), "fisheye")
+    focal_px, centre_px = camera.matrix[0, 0], camera.matrix[:2, 2]
+    angles = np.deg2rad([0.0, 45.0, 89.0, 90.1, 120.0])
+    points_px = centre_px + np.column_stack([focal_px * angles, np.zeros(5)])
+    undistorted = camera.undistort(points_px)
+    np.testing.assert_allclose(undistorted[:3, 0] - centre_px[0], focal_px * np.tan(angles[:3]), rtol=GEOMETRY_REL)
+    assert np.isnan(undistorted[3:]).all()
+
+
+@pytest.mark.parametrize("camera", [lens_camera(), fisheye_camera()], ids=["brown", "fisheye"])
+def test_the_derivatives_of_a_lens_are_differences_of_it(camera: Camera) -> None:
+    rays = np.random.default_rng(0).uniform(-0.6, 0.6, (50, 2))
+    rays[0] = 0.0
+    bent, jacobian = camera.distorted_with_jacobian(rays)
+    step = 1e-6
+    for axis, move in enumerate(np.eye(2) * step):
+        difference = (camera.distorted_with_jacobian(rays + move)[0] - bent) / step
+        np.testing.assert_allclose(jacobian[:, :, axis], difference, atol=NUMERICAL_DERIVATIVE_REL)
+    more = camera.refocused(1.0, float(camera.distortion[0]) + step)
+    assert more.lens == camera.lens
+    difference = (more.distorted_with_jacobian(rays)[0] - bent) / step
+    np.testing.assert_allclose(camera.distorted_by_k1(rays), difference, atol=NUMERICAL_DERIVATIVE_REL)
+
+
+def test_a_fisheye_stays_one_in_pictures_of_another_size_and_is_never_told_a_pinhole_s_k1() -> None:
+    camera = fisheye_camera()
+    half, point_px = camera.scaled_to(320, 240), np.array([[600.0, 30.0]])
+    ray = (camera.undistort(point_px) - camera.matrix[:2, 2]) / np.diag(camera.matrix)[:2]
+    half_ray = (half.undistort((point_px + 0.5) / 2.0 - 0.5) - half.matrix[:2, 2]) / np.diag(half.matrix)[:2]
+    np.testing.assert_allclose(half_ray, ray, atol=1e-9)
+    with pytest.raises(ValueError, match="fisheye"):
+        CameraPrior.calibrated(camera).with_distortion(RadialDistortion(-0.1, 0.03, 500.0))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from standoff.core.camera import Camera
-from standoff.core.errors import DataError, OutputError, SourceError
+from standoff.core.errors import DataError, GroundError, OutputError, SourceError
 from standoff.core.homography import FloatArray
 from standoff.evaluation.checkerboard import accuracy_percent, evaluate_checkerboard, evaluate_views, first_corner_first
 from standoff.evaluation.checkerboard_figure import checkerboard_figure
@@ -131,7 +131,7 @@ def test_unusable_input_is_refused_in_one_line(tmp_path: Path) -> None:
     missing = BoardView("missing.png", (640, 480), np.zeros((0, 0, 2)))
     with pytest.raises(DataError, match=r"a board of 9x6 .* found none in 1\."):
         evaluate_views([missing], (9, 6), 0.025)
-    with pytest.raises(DataError, match="positive side"):
+    with pytest.raises(GroundError, match="positive side"):
         evaluate_views([photographed(10.0)], (9, 6), float("nan"))
     with pytest.raises(DataError, match="aspect ratio"):
         evaluate_views([photographed(10.0)], (9, 6), 0.025, Camera(1920, 1080, _MATRIX, np.zeros(5)))

@@ -31,12 +31,14 @@ def calibrate(
         Path | None, typer.Option("--json", help="Also write the result as JSON; - prints it.")
     ] = None,
 ) -> None:
-    """Find a camera's matrix and lens distortion from photographs of a checkerboard."""
+    """Find a camera's matrix and lens distortion from photographs of a checkerboard, as the sensor has them."""
     from standoff.cli.console import print_table, write_json
     from standoff.stages.ground import calibrate as calibrate_camera
     from standoff.stages.ground import save_camera
 
     result = calibrate_camera(pictures, pattern_size(pattern), square_mm / 1000.0)
+    for warning in result.warnings:
+        typer.echo(f"standoff: warning: {warning}", err=True)
     save_camera(result.camera, out, calibration=result.to_dict())
     if json_file is not None:
         write_json(result.to_dict(), json_file)
@@ -44,5 +46,6 @@ def calibrate(
         return
     rows = [(name, f"{rms:.3f}") for name, rms in zip(result.views_used, result.per_view_rms_px, strict=True)]
     rows += [(name, "no board found") for name in result.views_failed]
+    rows += [(name, "another size") for name in result.views_of_other_size]
     caption = f"{result.rms_px:.3f} px over all views; wrote {out}"
     print_table("Reprojection error", ("view", "rms px"), rows, caption)

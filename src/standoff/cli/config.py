@@ -43,8 +43,9 @@ def _bounds(extras: Iterable[object]) -> str:
 
 def _yaml_lines(section: object, indent: str = "") -> Iterator[str]:
     """Yield a section as YAML in which every setting carries its meaning and bounds as a comment."""
-    import yaml
     from pydantic import BaseModel, TypeAdapter
+
+    from standoff.files.yaml_text import dump_yaml
 
     for name, meaning, bounds in _annotations(section):
         comment = f"{meaning} [{bounds}]" if bounds else meaning
@@ -55,7 +56,7 @@ def _yaml_lines(section: object, indent: str = "") -> Iterator[str]:
             yield from _yaml_lines(value, indent + "  ")
         else:
             plain = TypeAdapter(Any).dump_python(value, mode="json")
-            text = yaml.safe_dump(plain, default_flow_style=True, width=10_000).removesuffix("...\n").strip()
+            text = dump_yaml(plain, flow=True, width=10_000).removesuffix("...\n").strip()
             yield f"{indent}{name}: {text}"
 
 

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
-import yaml
 
 from standoff.core.errors import ConfigError
 
@@ -67,6 +66,7 @@ def train(
 
     require_packages("torch", "onnx", purpose="train a detector")
     from standoff.cli.train_sweep import train_sweep
+    from standoff.files.yaml_text import dump_yaml
     from standoff.training.my_site import prepare_plan
     from standoff.training.run.plan import Overrides
     from standoff.training.sweep.scenarios import read_sweep
@@ -76,7 +76,7 @@ def train(
     if sweep is not None:
         scenarios = read_sweep(sweep, overrides)
         if show:
-            typer.echo(yaml.safe_dump(scenarios.to_dict(), sort_keys=False), nl=False)
+            typer.echo(dump_yaml(scenarios.to_dict()), nl=False)
         else:
             train_sweep(scenarios, out, resumes=resume, quiet=quiet)
         return
@@ -84,7 +84,7 @@ def train(
         _refuse_changes({"--config": config, "--preset": preset, "--arch": arch, "--weights": weights})
     plan = _plan(config, preset, overrides, out if resume else None)
     if show:
-        typer.echo(yaml.safe_dump(plan.to_dict(), sort_keys=False), nl=False)
+        typer.echo(dump_yaml(plan.to_dict()), nl=False)
         return
     if preset is not None:
         plan = prepare_plan(plan, out, typer.echo)

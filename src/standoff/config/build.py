@@ -81,11 +81,15 @@ def build_detector(settings: Settings) -> Detector:
 
 
 def _configured_camera(settings: Settings) -> Camera | None:
-    return load_camera(settings.ground.camera) if settings.ground.camera else None
+    """Return the lens that the settings name, or their survey does: motion and map must know the same one."""
+    ground = settings.ground
+    if ground.camera is not None:
+        return load_camera(ground.camera)
+    return None if ground.survey is None else load_survey(ground.survey).camera
 
 
 def build_motion(settings: Settings) -> CameraMotionEstimator:
-    """Make what follows the picture, without the lens distortion where a camera file is given.
+    """Make what follows the picture, without the lens distortion where a camera file is given, here or in the survey.
 
     Raises:
         GroundError: The camera file cannot be used.
@@ -119,8 +123,6 @@ def build_ground(settings: Settings, known: CameraPrior | None = None) -> Ground
     ground = settings.ground
     given = ground.references
     survey = None if ground.survey is None else load_survey(ground.survey, camera=camera)
-    if survey is not None and camera is None and survey.camera is not None:
-        prior = CameraPrior.calibrated(survey.camera)
     if survey is not None and survey.time_s is None and not (given or ground.markers):
         return ScaleWatch(FixedCamera(survey), prior)
     method = given[0].params.method if given else "fused"

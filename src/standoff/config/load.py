@@ -9,13 +9,13 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Final
 
-import yaml
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 from pydantic_settings import BaseSettings, InitSettingsSource, PydanticBaseSettingsSource
 
 from standoff.config.settings import Settings
 from standoff.core.errors import ConfigError
+from standoff.files.yaml_text import read_yaml
 from standoff.stages.detect import SHIPPED_MODELS
 
 
@@ -47,14 +47,7 @@ def read_settings_file(path: Path) -> dict[str, Any]:
     Raises:
         ConfigError: It cannot be read, or holds something else.
     """
-    try:
-        loaded = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ConfigError(
-            expected=f"a readable settings file at {path}", found=str(error.strerror), fix="check the path"
-        ) from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise ConfigError(expected=f"YAML in {path}", found=str(error), fix="correct the file") from error
+    loaded = read_yaml(path, "a settings file", ConfigError)
     if loaded is None:
         return {}
     if not isinstance(loaded, dict):

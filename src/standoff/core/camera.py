@@ -1,4 +1,7 @@
-"""Pinhole camera with Brown-Conrady lens distortion: undistort and distort points.
+"""Cameras with Brown-Conrady or fisheye lenses: undistort and distort points.
+
+Undistorted points are those of an ideal pinhole camera, whatever the lens; only what a fisheye shows less than 90
+degrees off its axis has one.
 
 Half-pixel convention, written down once: the centre of the top-left pixel is (0, 0), as in OpenCV.
 Boxes `xyxy_px` use the same coordinates for their edges.
@@ -7,11 +10,30 @@ Boxes `xyxy_px` use the same coordinates for their edges.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Final, Literal
 
 import numpy as np
 
+from standoff.core.distortion import (
+    bent_by_brown,
+    bent_by_fisheye,
+    brown_by_k1,
+    brown_fold_r2,
+    fisheye_by_k1,
+    fisheye_fold_r2,
+    straightened_by_fisheye,
+)
 from standoff.core.homography import BoolArray, FloatArray
+
+Lens = Literal["brown", "fisheye"]
+
+COEFFICIENTS: Final[Mapping[Lens, int]] = {"brown": 5, "fisheye": 4}
+"""How many numbers say how a lens bends."""
+
+_STRONGEST = 1e9
+"""No coefficient is larger, of the longest lens; from far larger ones numbers overflow."""
 
 _UNDISTORT_ITERATIONS = 50
 _UNDISTORT_TOLERANCE = 1e-12
@@ -25,27 +47,40 @@ class Camera:
         width_px: Width of the pictures that it was calibrated on.
         height_px: Their height.
         matrix: (3, 3) camera matrix: fx, fy, cx, cy in pixels, no skew.
-        distortion: (5,) k1, k2, p1, p2, k3 of Brown and Conrady in OpenCV's order.
+        distortion: (5,) k1, k2, p1, p2, k3 of Brown and Conrady in OpenCV's order; of a fisheye (4,) k1, k2, k3, k4.
+        lens: Whose coefficients these are: "brown", or "fisheye", the equidistant model of `cv2.fisheye`.
     """
 
     width_px: int
     height_px: int
     matrix: FloatArray
     distortion: FloatArray
+    lens: Lens = "brown"
 
     def __post_init__(self) -> None:
         matrix = np.array(self.matrix, dtype=np.float64)
         distortion = np.array(self.distortion, dtype=np.float64).ravel()
-        if matrix.shape != (3, 3) or distortion.shape != (5,):
-            raise ValueError(f"matrix must be (3, 3), distortion (5,), not {matrix.shape} and {distortion.shape}")
+        if self.lens not in COEFFICIENTS:
+            raise ValueError(f"lens must be one of {', '.join(COEFFICIENTS)}, not {self.lens!r}")
+        # Compiled loops tell the lenses apart by how many coefficients there are.
+        wanted = (COEFFICIENTS[self.lens],)
+        if matrix.shape != (3, 3) or distortion.shape != wanted:
+            raise ValueError(f"matrix must be (3, 3), distortion {wanted}, not {matrix.shape} and {distortion.shape}")
         if not all(map(math.isfinite, [*matrix.ravel().tolist(), *distortion.tolist()])):
             raise ValueError("camera matrix and distortion must be finite")
         if matrix[0, 0] <= 0 or matrix[1, 1] <= 0:
             raise ValueError("focal lengths must be positive")
+        if np.abs(distortion).max() > _STRONGEST:
+            raise ValueError(f"distortion coefficients must be of a lens, below {_STRONGEST:g}")
         matrix.setflags(write=False)
         distortion.setflags(write=False)
         object.__setattr__(self, "matrix", matrix)
         object.__setattr__(self, "distortion", distortion)
+
+    @property
+    def bends(self) -> bool:
+        """Whether the picture differs from a pinhole camera's."""
+        return self.lens == "fisheye" or bool(self.distortion.any())
 
     def scaled_to(self, width_px: int, height_px: int) -> Camera:
         """Return the same camera for pictures of another size and the same field of view.
@@ -61,7 +96,7 @@ class Camera:
             )
         half_pixel = np.array([[1.0, 0.0, 0.5], [0.0, 1.0, 0.5], [0.0, 0.0, 1.0]])
         to_new = np.linalg.inv(half_pixel) @ np.diag([scale_x, scale_y, 1.0]) @ half_pixel
-        return Camera(width_px, height_px, to_new @ self.matrix, self.distortion)
+        return Camera(width_px, height_px, to_new @ self.matrix, self.distortion, self.lens)
 
     def refocused(self, focal_factor: float, k1: float) -> Camera:
         """Return the same camera with both focal lengths times a factor and another first radial coefficient."""
@@ -69,7 +104,7 @@ class Camera:
         matrix[0, 0] *= focal_factor
         matrix[1, 1] *= focal_factor
         distortion[0] = k1
-        return Camera(self.width_px, self.height_px, matrix, distortion)
+        return Camera(self.width_px, self.height_px, matrix, distortion, self.lens)
 
     def _to_normalised(self, points_px: FloatArray) -> FloatArray:
         focal = np.array([self.matrix[0, 0], self.matrix[1, 1]])
@@ -89,22 +124,12 @@ class Camera:
         Returns:
             (N, 2) the same, distorted, and (N, 2, 2) their derivative.
         """
-        k1, k2, p1, p2, k3 = self.distortion
-        x, y = normalised.T
-        r2 = x * x + y * y
-        radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-        slope = k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3)
-        distorted = np.column_stack(
-            [
-                x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
-                y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
-            ]
-        )
-        jacobian = np.empty((len(x), 2, 2))
-        jacobian[:, 0, 0] = radial + 2.0 * x * x * slope + 2.0 * p1 * y + 6.0 * p2 * x
-        jacobian[:, 0, 1] = jacobian[:, 1, 0] = 2.0 * x * y * slope + 2.0 * p1 * x + 2.0 * p2 * y
-        jacobian[:, 1, 1] = radial + 2.0 * y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x
-        return distorted, jacobian
+        bend = bent_by_fisheye if self.lens == "fisheye" else bent_by_brown
+        return bend(normalised, self.distortion)
+
+    def distorted_by_k1(self, normalised: FloatArray) -> FloatArray:
+        """Return (N, 2) how directions as the lens bends them change with its first radial coefficient."""
+        return fisheye_by_k1(normalised) if self.lens == "fisheye" else brown_by_k1(normalised)
 
     def _unfolded(self, normalised: FloatArray, jacobian: FloatArray) -> BoolArray:
         """Return (N,) whether the lens polynomial still grows from the centre outwards up to each point.
@@ -123,12 +148,8 @@ class Camera:
 
     def first_fold_r2(self) -> float:
         """Return the square of the undistorted radius at which the radial polynomial first turns back; inf if never."""
-        k1, k2, _, _, k3 = self.distortion.tolist()
-        if k3 == 0.0:
-            return _first_root(3.0 * k1, 5.0 * k2)
-        slope_roots = np.roots([7.0 * k3, 5.0 * k2, 3.0 * k1, 1.0])
-        folds_r2 = slope_roots.real[(slope_roots.real > 0) & (np.abs(slope_roots.imag) < 1e-12)]
-        return float(folds_r2.min(initial=np.inf))
+        fold_r2 = fisheye_fold_r2 if self.lens == "fisheye" else brown_fold_r2
+        return fold_r2(self.distortion)
 
     def distort(self, points_px: FloatArray) -> FloatArray:
         """Move ideal pinhole pixels to where the lens puts them.
@@ -139,7 +160,7 @@ class Camera:
         Returns:
             (N, 2), as seen in the picture; NaN outside the field of view that the lens polynomial can describe.
         """
-        if not self.distortion.any():
+        if not self.bends:
             return _finite(points_px)
         normalised = self._to_normalised(points_px)
         with np.errstate(invalid="ignore", over="ignore"):
@@ -155,11 +176,14 @@ class Camera:
 
         Returns:
             (N, 2) pixels of an ideal pinhole camera with the same matrix; NaN where the lens model has
-            no inverse (a point outside the field of view that the lens polynomial can describe).
+            no inverse (a point outside the field of view that the lens polynomial can describe, or 90 degrees and
+            more off the axis).
         """
-        if not self.distortion.any():
+        if not self.bends:
             return _finite(points_px)
         wanted = self._to_normalised(points_px)
+        if self.lens == "fisheye":
+            return self._to_pixels(straightened_by_fisheye(wanted, self.distortion, self.first_fold_r2()))
         estimate = wanted.copy()
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             for _ in range(_UNDISTORT_ITERATIONS):
@@ -178,17 +202,6 @@ class Camera:
             found = self._unfolded(estimate, jacobian) & (np.abs(distorted - wanted).max(axis=1, initial=0.0) < 1e-9)
         estimate[~found] = np.nan
         return self._to_pixels(estimate)
-
-
-def _first_root(slope: float, bend: float) -> float:
-    """Return the smallest positive root of 1 + slope x + bend x^2, without cancellation; inf if there is none."""
-    discriminant = slope * slope - 4.0 * bend
-    if discriminant < 0.0:
-        return math.inf
-    root = math.sqrt(discriminant)
-    if slope > 0.0:
-        return -(slope + root) / (2.0 * bend) if bend < 0.0 else math.inf
-    return 2.0 / (root - slope) if root > slope else math.inf
 
 
 def _finite(points_px: FloatArray) -> FloatArray:
@@ -262,11 +275,16 @@ class CameraPrior:
     def with_distortion(self, told: RadialDistortion) -> CameraPrior:
         """Return it after the motion of the picture has told of the radial distortion.
 
+        Raises:
+            ValueError: The lens is a fisheye, of which the motion's k1 says nothing.
+
         >>> prior = CameraPrior.unknown(1280, 720)
         >>> told = RadialDistortion(-0.1, prior.k1_sigma, float(prior.camera.matrix[0, 0]))
         >>> float(prior.with_distortion(told).camera.distortion[0])
         -0.05
         """
+        if self.camera.lens == "fisheye":
+            raise ValueError("the motion of the picture tells nothing of a fisheye")
         scale = (float(self.camera.matrix[0, 0]) / told.focal_px) ** 2
         own, heard = self.k1_sigma**-2, (told.sigma * scale) ** -2
         k1 = (own * float(self.camera.distortion[0]) + heard * told.k1 * scale) / (own + heard)

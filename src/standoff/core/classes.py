@@ -8,6 +8,7 @@ machines are half their length plus 1 m of articulation, which nobody has publis
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
 
@@ -63,6 +64,22 @@ def class_ids(role: Role) -> tuple[int, ...]:
     (0,)
     """
     return tuple(site_class.id for site_class in CLASSES if site_class.role is role)
+
+
+def names_in_list(names: Iterable[object]) -> tuple[str, ...]:
+    """Return the names of a list that a file gave, texts or whole numbers.
+
+    Raises:
+        ValueError: One is something else: what the file's language made of it need not be how it was written.
+
+    >>> names_in_list(["no", 7])
+    ('no', '7')
+    """
+    names = tuple(names)
+    for name in names:
+        if isinstance(name, bool) or not isinstance(name, str | int):
+            raise ValueError(f"the name {name!r}, which is no text; put it in quotes")
+    return tuple(str(name) for name in names)
 
 
 def names_by_line(text: str) -> tuple[str, ...]:

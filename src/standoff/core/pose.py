@@ -196,7 +196,7 @@ class View:
         by_view[:, :, TURN] = by_camera_point @ cross
         by_view[:, :, SHIFT] = -by_point
         by_view[:, :, 6] = distorted * focal
-        by_view[:, :, 7] = normalised * (normalised**2).sum(axis=1, keepdims=True) * focal
+        by_view[:, :, 7] = self.camera.distorted_by_k1(normalised) * focal
         return points_px, by_view, by_point
 
 

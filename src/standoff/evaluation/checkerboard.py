@@ -24,6 +24,7 @@ from standoff.core.errors import DataError
 from standoff.core.homography import FloatArray
 from standoff.core.pose import CHANGES
 from standoff.stages.ground import BoardView, PointObservation, belief_from_points, map_from_view, read_boards
+from standoff.stages.ground.boards import check_square
 from standoff.stages.ground.solid_fit import Belief
 
 FIRST_CORNER = "of the board's four outer corners the one nearest to the picture's top left"
@@ -198,8 +199,7 @@ def evaluate_views(
     Raises:
         DataError: No photograph could be measured, or the camera is for pictures of another shape.
     """
-    if not (np.isfinite(square_m) and square_m > 0):
-        raise DataError(expected="a square with a positive side", found=f"{square_m} m", fix="measure one square")
+    check_square(square_m)
     measured, failed = [], {}
     for view in views:
         if not view.found:

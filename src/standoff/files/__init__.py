@@ -1,1 +1,1 @@
-"""Files and folders that are whole at any moment, and JSON that every reader accepts; for every package alike."""
+"""Files and folders that are whole at any moment; text, YAML and JSON, read and written in one way."""

@@ -1,10 +1,11 @@
-"""JSON that every reader accepts: no NaN, no infinity, no types of ours."""
+"""JSON that every reader accepts: no NaN, no infinity, no types of ours; and JSON of others, read strictly."""
 
 from __future__ import annotations
 
 import json
 import math
 import os
+import re
 from collections.abc import Mapping, Set
 from contextlib import suppress
 from dataclasses import asdict, is_dataclass
@@ -15,7 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from standoff.core.errors import OutputError
+from standoff.core.errors import DataError, OutputError, StandoffError
+from standoff.files.plain_text import read_text
 from standoff.files.whole import partial_path
 
 
@@ -81,3 +83,57 @@ def write_json(path: Path, value: Any) -> None:  # noqa: ANN401
             found=error.strerror or str(error),
             fix="make room, or choose a file in a folder that is writable",
         ) from error
+
+
+class _Twice(ValueError):
+    """An object has a key twice.
+
+    Args:
+        key: Which.
+    """
+
+    def __init__(self, key: str) -> None:
+        self.key = key
+        super().__init__(key)
+
+
+def parse_json(text: str, what: str, where: str, error: type[StandoffError] = DataError) -> Any:  # noqa: ANN401
+    """Return what a JSON text says.
+
+    Args:
+        text: The JSON.
+        what: What it should be, for the message ("a COCO file").
+        where: It stands, for the message: a path.
+        error: Raised where it cannot be read.
+
+    Raises:
+        StandoffError: `error`: it is not JSON, or an object has a key twice: the last one would win in silence.
+    """
+    try:
+        return json.loads(text, object_pairs_hook=_once_each)
+    except _Twice as twice:
+        places = [text.count("\n", 0, at.start()) + 1 for at in re.finditer(re.escape(json.dumps(twice.key)), text)]
+        # Of a key that other objects have as well, nobody can say so which two they are.
+        lines = f" (lines {places[0]} and {places[1]})" if len(places) == 2 else ""
+        found = f"{where}: the key `{twice.key}` twice in one object{lines}"
+        raise error(expected=what, found=found, fix="keep one of them") from None
+    except (ValueError, RecursionError) as problem:
+        reason = str(problem) if isinstance(problem, json.JSONDecodeError) else "nested too deeply, or a huge number"
+        raise error(expected=what, found=f"{where}: not JSON ({reason})", fix="correct the file") from None
+
+
+def read_json(path: Path, what: str, error: type[StandoffError] = DataError) -> Any:  # noqa: ANN401
+    """Return what a JSON file says, as `parse_json`.
+
+    Raises:
+        StandoffError: `error`: it cannot be read either.
+    """
+    return parse_json(read_text(path, what, error), what, str(path), error)
+
+
+def _once_each(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    content = dict(pairs)
+    if len(content) < len(pairs):
+        names = [key for key, _ in pairs]
+        raise _Twice(next(key for key in names if names.count(key) > 1))
+    return content

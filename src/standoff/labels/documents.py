@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from standoff.core.errors import DataError
+from standoff.files import json_text, yaml_text
 
 
 def read_yaml(path: Path) -> dict[str, Any]:
@@ -19,11 +17,7 @@ def read_yaml(path: Path) -> dict[str, Any]:
     Raises:
         DataError: It cannot be read, is not YAML, or holds something else.
     """
-    try:
-        content = yaml.safe_load(_read_text(path))
-    except yaml.YAMLError as error:
-        raise DataError(expected=f"YAML in {path}", found=str(error), fix="correct the file") from error
-    return _checked(content, path, "YAML")
+    return _checked(yaml_text.read_yaml(path, "names and values as YAML"), path, "YAML")
 
 
 def read_json(path: Path) -> dict[str, Any]:
@@ -32,11 +26,7 @@ def read_json(path: Path) -> dict[str, Any]:
     Raises:
         DataError: It cannot be read, is not JSON, or holds something else.
     """
-    try:
-        content = json.loads(_read_text(path))
-    except (json.JSONDecodeError, RecursionError) as error:
-        raise DataError(expected=f"JSON in {path}", found=str(error), fix="export it again") from error
-    return _checked(content, path, "JSON")
+    return _checked(json_text.read_json(path, "names and values as JSON"), path, "JSON")
 
 
 def check_types(entry: Mapping[str, Any], types: Mapping[str, tuple[type, ...]], where: str) -> None:
@@ -61,17 +51,6 @@ def check_types(entry: Mapping[str, Any], types: Mapping[str, tuple[type, ...]],
 def resolve_path(text: str, folder: Path) -> Path:
     """Return a path relative to a folder, with `~` and $VARIABLES filled in."""
     return folder / Path(os.path.expandvars(text)).expanduser()
-
-
-def _read_text(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise DataError(
-            expected=f"a readable file at {path}", found=str(error.strerror), fix="check the path"
-        ) from error
-    except UnicodeDecodeError as error:
-        raise DataError(expected=f"UTF-8 text in {path}", found=str(error), fix="save it as UTF-8") from error
 
 
 def _checked(content: object, path: Path, language: str) -> dict[str, Any]:

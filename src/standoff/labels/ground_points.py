@@ -15,7 +15,9 @@ from typing import Final
 import numpy as np
 
 from standoff.core.boxes import unknown_points
+from standoff.core.errors import DataError
 from standoff.core.homography import FloatArray
+from standoff.files.plain_text import read_text
 
 POINTS_FOLDER: Final = "points"
 """Of a YOLO data set, beside `images` and `labels`."""
@@ -62,12 +64,12 @@ def read_points(path: Path, count: int, size_px: tuple[int, int]) -> FloatArray:
         ValueError: It does not hold so many points; says what it holds.
     """
     try:
-        rows = [line.split() for line in path.read_text(encoding="utf-8-sig").splitlines() if line.strip()]
+        rows = [line.split() for line in read_text(path, "ground points").splitlines() if line.strip()]
         if any(len(row) != 2 for row in rows):
             raise ValueError("a line that is not two numbers")
         shares = np.array(rows, dtype=np.float64).reshape(-1, 2)
-    except OSError as error:
-        raise ValueError(f"no text ({error})") from error
+    except DataError as error:
+        raise ValueError(f"no text ({error.found})") from error
     if len(shares) != count:
         raise ValueError(f"{len(shares)} points of {count} boxes")
     return in_pixels(shares, size_px)

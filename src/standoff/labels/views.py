@@ -14,10 +14,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from standoff.core.camera import Camera
+from standoff.core.camera import Camera, Lens
 from standoff.core.errors import DataError
 from standoff.core.homography import FloatArray
 from standoff.core.pose import View
+from standoff.files.json_text import parse_json
+from standoff.files.plain_text import read_text
 
 VIEWS_FILE: Final = "views.jsonl"
 
@@ -47,6 +49,7 @@ def view_line(picture: str, seen: GroundView) -> str:
         "size_px": [camera.width_px, camera.height_px],
         "camera_matrix": camera.matrix.tolist(),
         "distortion": camera.distortion.tolist(),
+        "lens": camera.lens,
         "position_m": seen.view.position_m.tolist(),
         "site_to_camera": seen.view.site_to_camera.tolist(),
         "ground_m": seen.ground_m,
@@ -61,9 +64,9 @@ def read_views(path: Path) -> dict[str, GroundView]:
         DataError: A line is something else.
     """
     views = {}
-    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
+    for number, line in enumerate(read_text(path, "the views of a set").splitlines(), start=1):
+        entry = parse_json(line, "a camera", f"line {number} of {path}")
         try:
-            entry = json.loads(line)
             views[str(entry["picture"])] = _ground_view(entry)
         except (KeyError, TypeError, ValueError) as error:
             raise DataError(
@@ -99,6 +102,7 @@ def views_of(pictures: Sequence[Path]) -> dict[int, GroundView]:
 
 def _ground_view(entry: dict[str, Any]) -> GroundView:
     width_px, height_px = (int(side) for side in entry["size_px"])
-    camera = Camera(width_px, height_px, np.array(entry["camera_matrix"]), np.array(entry["distortion"]))
+    lens: Lens = entry.get("lens", "brown")
+    camera = Camera(width_px, height_px, np.array(entry["camera_matrix"]), np.array(entry["distortion"]), lens)
     view = View(camera, np.array(entry["position_m"]), np.array(entry["site_to_camera"]))
     return GroundView(view, float(entry["ground_m"]))

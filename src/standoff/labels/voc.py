@@ -14,6 +14,7 @@ from typing import Final
 
 import numpy as np
 
+from standoff.files.plain_text import read_text
 from standoff.labels.pictures import SUFFIXES, first_file, read_size_px
 from standoff.labels.source import BadPicture, SourcePicture, SourceSet, read_each
 from standoff.labels.types import SPLITS, Split
@@ -44,7 +45,7 @@ def _read_splits(folder: Path) -> dict[str, Split]:
     splits: dict[str, Split] = {}
     for split in SPLITS:
         if (folder / f"{split}.txt").is_file():
-            lines = (folder / f"{split}.txt").read_text(encoding="utf-8-sig", errors="replace").splitlines()
+            lines = read_text(folder / f"{split}.txt", "a list of pictures").splitlines()
             splits |= {line.split()[0]: split for line in lines if line.strip()}
     return splits
 

@@ -9,13 +9,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
-from standoff.core.classes import names_by_line
+from standoff.core.classes import names_by_line, names_in_list
 from standoff.core.errors import DataError
 from standoff.core.homography import FloatArray
+from standoff.files.plain_text import read_text
 from standoff.labels.documents import read_yaml
 from standoff.labels.ground_points import POINTS_FOLDER, in_pixels, read_points
 from standoff.labels.pictures import find_pictures, first_file, read_size_px
@@ -80,30 +81,27 @@ def labels_of(names: object, path: Path) -> tuple[str, ...]:
     >>> labels_of({1: "car", 0: "person"}, Path("data.yaml"))
     ('person', 'car')
     """
-    if isinstance(names, list) and names:
-        return tuple(str(name) for name in names)
-    if isinstance(names, Mapping) and names:
-        by_id = _by_id(names)
-        if sorted(by_id) == list(range(len(by_id))):
-            return tuple(by_id[number] for number in range(len(by_id)))
+    found = repr(names)
+    try:
+        if isinstance(names, list) and names:
+            return names_in_list(names)
+        if isinstance(names, Mapping) and names:
+            by_id = {int(number): name for number, name in names.items()}
+            if sorted(by_id) == list(range(len(by_id))):
+                return names_in_list(by_id[number] for number in range(len(by_id)))
+    except (TypeError, ValueError) as error:
+        found = str(error)
     raise DataError(
         expected=f"`names` in {path}: a list of labels, or a mapping from class ids 0, 1, 2 ... to labels",
-        found=repr(names),
+        found=found,
         fix="write down the labels in the order of their ids",
     )
-
-
-def _by_id(names: Mapping[Any, Any]) -> dict[int, str]:
-    try:
-        return {int(number): str(name) for number, name in names.items()}
-    except (TypeError, ValueError):
-        return {}
 
 
 def _read_names(folder: Path) -> tuple[str, ...]:
     for name in _NAME_FILES:
         if (folder / name).is_file():
-            text = (folder / name).read_text(encoding="utf-8-sig", errors="replace")
+            text = read_text(folder / name, "a label a line")
             try:
                 labels = names_by_line(text)
             except ValueError as error:
@@ -125,7 +123,7 @@ def _pictures_at(root: Path, beside: Path, place: str, path: Path) -> list[Path]
         if candidate.is_dir():
             return find_pictures(candidate)
         if candidate.is_file():
-            lines = candidate.read_text(encoding="utf-8-sig", errors="replace").splitlines()
+            lines = read_text(candidate, "a list of pictures").splitlines()
             return [_listed_picture(line.strip(), candidate.parent, (root, beside)) for line in lines if line.strip()]
     raise DataError(
         expected=f"the folder or list of pictures '{place}' that {path} names",
@@ -205,9 +203,9 @@ def _sibling(picture: Path, folder: str) -> Path | None:
 def _read_rows(path: Path) -> FloatArray:
     """Return (N, 7) numbers of a label file, the last two NaN where no point is marked; an empty file has none."""
     try:
-        lines = [line.split() for line in path.read_text(encoding="utf-8-sig").splitlines()]
-    except (OSError, UnicodeDecodeError) as error:
-        raise BadPicture(path, f"no text ({error})", "unreadable labels") from error
+        lines = [line.split() for line in read_text(path, "labels").splitlines()]
+    except DataError as error:
+        raise BadPicture(path, f"no text ({error.found})", "unreadable labels") from error
     rows = [row for row in lines if row]
     wrong = [len(row) for row in rows if len(row) not in (_BOX, _BOX_AND_POINT)]
     if wrong:

@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any, Final, Literal
 
 import numpy as np
-import yaml
 
 from standoff import __version__
 from standoff.core.classes import CLASSES
 from standoff.core.homography import FloatArray
 from standoff.core.pose import View
+from standoff.files.yaml_text import dump_yaml, write_yaml
 from standoff.labels.ground_points import POINTS_FOLDER, points_line
 from standoff.labels.marking import would_be_marked
 from standoff.labels.regions import OWN_REGIONS
@@ -124,12 +124,13 @@ class PictureSet:
                 text = json.dumps(self._annotations[split].to_dict(f"{description}, {split}"))
                 (self._folder / "annotations" / f"{split}.json").write_text(text)
         if self._ignored:
-            (self._folder / OWN_REGIONS).write_text(yaml.safe_dump(self._ignored, default_flow_style=None))
+            text = dump_yaml(dict(sorted(self._ignored.items())), flow=None)
+            (self._folder / OWN_REGIONS).write_text(text, encoding="utf-8")
         if self._views:
             (self._folder / VIEWS_FILE).write_text("".join(self._views))
         names = {site_class.id: site_class.name for site_class in CLASSES}
         content: dict[str, Any] = {**{split: f"images/{split}" for split in SPLITS}, "names": names}
-        (self._folder / "data.yaml").write_text(yaml.safe_dump(content, sort_keys=False))
+        write_yaml(self._folder / "data.yaml", content)
         (self._folder / "dataset.json").write_text(
             json.dumps({"standoff": __version__, **settings}, default=str, indent=2)
         )

@@ -13,13 +13,13 @@ from typing import Any, TypeVar
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
-import yaml
 
 from standoff import __version__
 from standoff.core.classes import CLASSES
 from standoff.core.homography import FloatArray
 from standoff.core.pose import View
 from standoff.files.whole import whole_folder
+from standoff.files.yaml_text import write_yaml
 from standoff.simulation.coco import Annotations
 from standoff.simulation.crew import work_through
 from standoff.simulation.detection_noise import DETECTIONS_SCHEMA, NoisyDetector
@@ -288,7 +288,7 @@ def _save_reference(reference: Reference | None, view: View, path: Path) -> None
         hint = {"first_corner_px": first_px.tolist()} if ((first_px >= 0) & (first_px < size_px)).all() else {}
         shape = {"corners_m": reference.top_m[:, :2].tolist(), "height_m": reference.height_m}
         ground["reference"] = {**shape, **hint}
-    path.write_text(yaml.safe_dump({"ground": ground}, sort_keys=False))
+    write_yaml(path, {"ground": ground})
 
 
 def _save_json(content: dict[str, Any], path: Path) -> None:

@@ -223,7 +223,7 @@ OPEN = ("w", "h")
     ("outputs", "size_px", "text", "message"),
     [
         (ROWS, (64, 64), "", "m.yaml, found no `key: value` lines"),
-        (ROWS, (64, 64), "a: [", "m.yaml, found .*expected"),
+        (ROWS, (64, 64), "a: [", "m.yaml.*not YAML"),
         (ROWS, (64, 64), "family: yolox", "found no classes"),
         (
             ROWS,
@@ -240,7 +240,9 @@ OPEN = ("w", "h")
         (ROWS, (64, 64), YOLOX + "input_size: 64", "input_size 64, which is not like 640x640"),
         (ROWS, (64, 64), YOLOX + "input_size: 96x64", "input_size 96x64, but the graph takes 64x64"),
         (ROWS, (64, 64), "family: yolox\nclasses: {a: 1}", "neither a list of labels nor a file"),
-        (ROWS, (64, 64), "family: yolox\nclasses: none.txt", "No such file"),
+        (ROWS, (64, 64), "family: yolox\nclasses: [no, true]", "the name True, which is no text; put it in quotes"),
+        (ROWS, (64, 64), "family: yolox\nfamily: detr", "line 2: the key `family` a second time, after line 1"),
+        (ROWS, (64, 64), "family: yolox\nclasses: none.txt", "no such file"),
         (ROWS, OPEN, YOLOX, "no input_size, which the graph leaves open"),
         (
             ROWS,

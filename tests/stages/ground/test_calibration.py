@@ -5,7 +5,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from tolerances import BOARD_CORNER_PX, CALIBRATED_FOCAL_REL
+from PIL import Image
+from tolerances import BOARD_CORNER_PX, CALIBRATED_FOCAL_REL, GEOMETRY_REL
 
 from standoff.core.camera import Camera
 from standoff.core.errors import GroundError, SourceError
@@ -20,12 +21,14 @@ _CAMERA = Camera(
 _TILTS = [(0.3, 0.0), (-0.3, 0.1), (0.0, 0.4), (0.1, -0.4), (0.35, 0.3), (-0.2, -0.3)]
 
 
-def photographed(name: str, tilt_x: float, tilt_y: float, square_m: float = 0.03) -> BoardView:
-    """A 7x5 board as OpenCV projects it, its centre 0.8 m before the camera."""
+def photographed(
+    name: str, tilt_x: float, tilt_y: float, square_m: float = 0.03, camera: Camera = _CAMERA, away_m: float = 0.8
+) -> BoardView:
+    """A 7x5 board as OpenCV projects it, its centre some way before the camera."""
     grid = np.stack(np.meshgrid(np.arange(7.0), np.arange(5.0)), axis=-1) * square_m
     space = np.concatenate([grid - grid.mean(axis=(0, 1)), np.zeros((5, 7, 1))], axis=-1).reshape(-1, 3)
-    turn, shift = np.array([tilt_x, tilt_y, 0.1]), np.array([0.02, -0.01, 0.8])
-    corners = cv2.projectPoints(space, turn, shift, _CAMERA.matrix, _CAMERA.distortion)[0]
+    turn, shift = np.array([tilt_x, tilt_y, 0.1]), np.array([0.02, -0.01, away_m])
+    corners = cv2.projectPoints(space, turn, shift, camera.matrix, camera.distortion)[0]
     return BoardView(name, (800, 600), corners.reshape(5, 7, 2))
 
 
@@ -113,9 +116,78 @@ def test_views_that_do_not_determine_the_camera_are_refused_in_one_line() -> Non
     missing = BoardView("missing.png", (800, 600), np.zeros((0, 0, 2)))
     assert "found it in 2 of 3" in ground_error([*good[:2], missing])
     assert "found it in 0 of 2" in ground_error([missing, missing])
-    other_size = BoardView("turned.png", (600, 800), good[0].corners_px)
-    assert "600x800 (turned.png)" in ground_error([*good[:3], other_size])
+    others = [BoardView(f"turned {i}.png", (600, 800), good[0].corners_px) for i in range(2)]
+    assert "600x800 (turned 0.png)" in ground_error([*good[:3], *others])
     assert "positive side" in ground_error(good, square_m=0.0)
+    assert "0.025 mm, likely in metres" in ground_error(good, square_m=0.025e-3)
+    assert "25000 mm, likely in micrometres" in ground_error(good, square_m=25.0)
+
+
+def test_photographs_of_another_size_are_left_out_by_name() -> None:
+    good = [photographed(f"{i}.png", *tilt) for i, tilt in enumerate(_TILTS)]
+    odd = BoardView("odd.png", (801, 601), good[0].corners_px)
+    result = calibrate_views([odd, *good])
+    np.testing.assert_allclose(result.camera.matrix, calibrate_views(good).camera.matrix, rtol=GEOMETRY_REL)
+    assert (result.views_of_other_size, len(result.views_used)) == (("odd.png",), len(good))
+    assert any("odd.png (801x601)" in warning for warning in result.warnings)
+    assert not any("left out" in warning for warning in calibrate_views(good).warnings)
+
+
+def test_corners_in_a_wrong_order_are_refused_whatever_the_lens_would_be() -> None:
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        views = []
+        for i, tilt in enumerate(_TILTS):
+            corners_px = photographed(f"{i}.png", *tilt).corners_px
+            row, column = rng.integers(0, 2), rng.integers(0, 4)
+            # As where a pattern of 4 x 4 is looked for and some part of the board is found, some way round.
+            part = corners_px[row : row + 4, column : column + 4]
+            mixed = part[rng.permutation(4)] if i % 2 else part
+            views.append(BoardView(f"{i}.png", (800, 600), mixed))
+        assert "check the pattern" in ground_error(views).lower()
+
+
+@pytest.mark.parametrize(
+    ("matrix", "found"),
+    [
+        ([[900.0, 0, 400], [0, 1800.0, 300], [0, 0, 1]], "fx 900, fy 1800"),
+        ([[900.0, 0, 700], [0, 900.0, 300], [0, 0, 1]], "it at 700, 300"),
+    ],
+)
+def test_a_camera_that_nobody_builds_is_refused(matrix: list[list[float]], found: str) -> None:
+    unlikely = Camera(800, 600, np.array(matrix), np.zeros(5))
+    views = [photographed(f"{i}.png", *tilt, camera=unlikely) for i, tilt in enumerate(_TILTS)]
+    assert found in ground_error(views)
+
+
+def test_a_fisheye_is_told_by_the_corners_that_no_usual_lens_explains() -> None:
+    matrix, distortion = np.array([[260.0, 0, 400], [0, 260.0, 300], [0, 0, 1]]), np.array([-0.02, 0.01, -0.004, 0.001])
+    rng, views = np.random.default_rng(0), []
+    grid = np.stack(np.meshgrid(np.arange(7.0) - 3.0, np.arange(5.0) - 2.0, [0.0]), axis=-1).reshape(-1, 1, 3) * 0.03
+    for i in range(24):
+        angle, off = rng.uniform(0.0, 2.0 * np.pi), rng.uniform(0.0, 1.1)
+        shift = 0.35 * np.array([np.sin(off) * np.cos(angle), np.sin(off) * np.sin(angle), np.cos(off)])
+        seen = cv2.fisheye.projectPoints(grid, rng.uniform(-0.4, 0.4, 3), shift, matrix, distortion)[0]
+        views.append(BoardView(f"{i}.png", (800, 600), seen.reshape(5, 7, 2) + rng.normal(0.0, 0.1, (5, 7, 2))))
+    assert "as a fisheye" in ground_error(views)
+
+
+def test_what_the_boards_do_not_cover_is_said() -> None:
+    views = [photographed(f"{i}.png", *tilt, away_m=2.5) for i, tilt in enumerate(_TILTS)]
+    assert any(
+        "of the picture: the distortion beyond is a guess" in warning for warning in calibrate_views(views).warnings
+    )
+
+
+def test_photographs_are_taken_as_the_sensor_has_them(tmp_path: Path) -> None:
+    picture = Image.fromarray(drawn_board(7, 5))
+    turned = Image.Exif()
+    turned[0x0112] = 6
+    picture.save(tmp_path / "held upright.jpg", exif=turned, quality=95)
+    picture.save(tmp_path / "held level.jpg", quality=95)
+    level, upright = read_boards(tmp_path, (7, 5))
+    assert level.image_size_px == upright.image_size_px == (440, 360)
+    np.testing.assert_array_equal(level.corners_px, upright.corners_px)
 
 
 @pytest.mark.parametrize("seed", range(4))

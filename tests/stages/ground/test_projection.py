@@ -5,7 +5,7 @@ import pytest
 from drawn_solid import lens, looking_at
 from tolerances import GEOMETRY_REL
 
-from standoff.core.camera import Camera
+from standoff.core.camera import COEFFICIENTS, Camera
 from standoff.core.homography import FloatArray
 from standoff.core.pose import View
 from standoff.stages.ground.projection import eye_of, on_ground, project, project_with_jacobians, turned_by
@@ -15,12 +15,15 @@ LENSES = {
     "barrel": (-0.25, 0.06, 1e-3, -5e-4, 0.0),
     "k1 alone": (-0.3, 0.0, 0.0, 0.0, 0.0),
     "k3 too": (-0.2, 0.05, 2e-4, 1e-4, -0.01),
+    "fisheye": (-0.02, 0.01, -0.004, 0.001),
+    "fisheye that folds": (-0.3, 0.01, 0.0, 0.0),
 }
 
 
 def _view(name: str) -> View:
     plain = lens()
-    camera = Camera(plain.width_px, plain.height_px, plain.matrix, np.array(LENSES[name]))
+    model = next(model for model, count in COEFFICIENTS.items() if count == len(LENSES[name]))
+    camera = Camera(plain.width_px, plain.height_px, plain.matrix, np.array(LENSES[name]), model)
     return looking_at(camera, (1.0, 2.0), away_m=12.0, heading_deg=30.0, pitch_deg=40.0)
 
 

@@ -3,6 +3,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import cv2
@@ -11,6 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from laws import examples
+from mutations import mutated
 from tolerances import GROUND_THROUGH_LENS_M, SURVEY_COVERAGE, SURVEY_SIGMA_REL
 
 from standoff.core import homography
@@ -405,3 +407,17 @@ def test_a_survey_file_that_is_wrong_gets_one_line_that_says_how(tmp_path: Path,
         load_survey(survey_file(tmp_path, text))
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+@examples(200)
+@given(mutated(st.just(_SURVEY.encode())))
+def test_a_damaged_survey_file_is_a_map_or_one_line(content: bytes) -> None:
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "survey.yaml"
+        path.write_bytes(content)
+        try:
+            ground = load_survey(path)
+        except GroundError as error:
+            assert "\n" not in str(error)
+        else:
+            assert np.isfinite(ground.fit.image_to_ground).all()

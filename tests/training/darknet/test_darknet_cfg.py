@@ -92,7 +92,7 @@ def test_a_missing_and_a_binary_file_are_refused_in_one_line(tmp_path: Path) -> 
     with pytest.raises(ModelError, match=re.escape(str(tmp_path / "none.cfg"))):
         read_cfg(tmp_path / "none.cfg")
     (tmp_path / "binary.cfg").write_bytes(b"[net]\x00\x80")
-    with pytest.raises(ModelError, match="not text"):
+    with pytest.raises(ModelError, match="a binary file"):
         read_cfg(tmp_path / "binary.cfg")
 
 
@@ -104,7 +104,7 @@ def test_comments_may_be_in_any_encoding(tmp_path: Path) -> None:
         path.write_bytes(content)
         assert read_cfg(path).heads[0].anchors_px == expected.heads[0].anchors_px
     path.write_bytes(text.encode("utf-16"))
-    with pytest.raises(ModelError, match=r"in UTF-8 at .*found UTF-16\. Save the file as UTF-8"):
+    with pytest.raises(ModelError, match=r"found UTF-16\. Save the file as UTF-8"):
         read_cfg(path)
 
 

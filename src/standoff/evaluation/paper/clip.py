@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +15,7 @@ from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import IntArray
 from standoff.evaluation.paper.clip_tables import FRAMES, PAIRS, REFERENCE_PX, TRUTH, read_table
 from standoff.evaluation.positions_input import Columns
+from standoff.files.json_text import read_json
 
 FORMAT = 1
 SCENE = "scene.json"
@@ -166,10 +166,7 @@ def _read_scene(folder: Path) -> Mapping[str, Any]:
     if not path.is_file():
         fix = "give the folder that `standoff simulate` wrote"
         raise DataError(expected="a clip folder", found=f"no {path}", fix=fix)
-    try:
-        scene = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise DataError(expected=f"JSON in {path}", found=str(error), fix=_FIX) from error
+    scene = read_json(path, "what a clip shows")
     found = scene.get("format") if isinstance(scene, dict) else None
     if found != FORMAT:
         raise DataError(expected=f"a clip of format {FORMAT}", found=f"format {found} in {path}", fix=_FIX)

@@ -10,12 +10,12 @@ from types import MappingProxyType
 from typing import Any, get_args
 
 import numpy as np
-import yaml
 
 from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.errors import DataError
 from standoff.core.homography import FloatArray
 from standoff.core.types import IntArray
+from standoff.files.yaml_text import read_yaml
 from standoff.labels.documents import check_types, resolve_path
 from standoff.labels.mixture import IGNORE
 from standoff.labels.pictures import find_pictures, read_size_px
@@ -130,12 +130,7 @@ def _below(folder: Path) -> list[Path]:
 
 
 def _listed(file: Path) -> list[Background]:
-    try:
-        entries = yaml.safe_load(file.read_text())
-    except (OSError, yaml.YAMLError) as error:
-        raise DataError(
-            expected="a YAML list of backgrounds", found=f"{file}: {error}", fix="see docs/simulator.md"
-        ) from error
+    entries = read_yaml(file, "a YAML list of backgrounds")
     if not isinstance(entries, list):
         raise DataError(expected="a YAML list of backgrounds", found=f"another thing in {file}", fix="begin with '- '")
     found: list[Background] = []

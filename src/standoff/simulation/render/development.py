@@ -35,7 +35,7 @@ class Development:
         """Return the map of a camera; it is kept until the camera changes."""
         if (camera.width_px, camera.height_px) != self._size_px:
             raise ValueError(f"the camera is for {camera.width_px}x{camera.height_px}, the renderer {self._size_px}")
-        key = camera.matrix.tobytes() + camera.distortion.tobytes()
+        key = camera.matrix.tobytes() + camera.distortion.tobytes() + camera.lens.encode()
         if self._known is None or self._known[0] != key:
             lens_map = LensMap.of(camera, 0, 0, *self._size_px)
             drawn_px = (lens_map.undistorted_px - lens_map.origin_px).astype(np.float32)

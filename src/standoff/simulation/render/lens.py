@@ -55,7 +55,7 @@ def _exact_grid(camera: Camera, x: FloatArray, y: FloatArray) -> FloatArray:
 
 def _undistorted_grid(camera: Camera, x: FloatArray, y: FloatArray) -> FloatArray:
     """Return (len(y), len(x), 2), from a cubic spline through a coarse grid where the lens is smooth."""
-    if not camera.distortion.any():
+    if not camera.bends:
         return np.stack(np.meshgrid(x, y), axis=-1).astype(np.float64)
     knots = [np.linspace(axis[0], axis[-1], len(axis) // _STEP_PX + 5) for axis in (x, y)]
     coarse = _exact_grid(camera, *knots)

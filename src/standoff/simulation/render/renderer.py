@@ -129,7 +129,7 @@ class Renderer:
             batches: What moves, where it is now.
             light: Sun, sky, haze.
         """
-        if self._relief is None or view.camera.distortion.any():
+        if self._relief is None or view.camera.bends:
             raise ValueError("load a scene first, and take a camera without distortion")
         with self._context:
             targets, frustum = self._draw(view, batches, light, self._relief, cut_out=True)

@@ -26,11 +26,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final, Literal, get_args
 
-import yaml
-
-from standoff.core.classes import names_by_line
+from standoff.core.classes import names_by_line, names_in_list
 from standoff.core.errors import ModelError
-from standoff.files.utf8_text import read_utf8
+from standoff.files.plain_text import read_text
+from standoff.files.yaml_text import read_yaml
 from standoff.stages.detect.letterbox import DARKNET, Colour, Placement, Preprocessing
 
 Family = Literal["yolov3", "yolov5", "yolov8", "yolov10", "yolox", "detr"]
@@ -113,7 +112,7 @@ def read_description(path: Path) -> Description:
     """
     try:
         return _description(_parsed(path), path)
-    except (OSError, yaml.YAMLError, ValueError, RecursionError) as error:
+    except ValueError as error:
         raise undescribed(path, str(error)) from error
 
 
@@ -124,7 +123,7 @@ def undescribed(path: Path, found: str) -> ModelError:
 
 
 def _parsed(path: Path) -> dict[str, Any]:
-    content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    content = read_yaml(path, "the description of a detector", ModelError)
     if not isinstance(content, dict):
         raise ValueError("no `key: value` lines")
     unknown = [str(key) for key in content if key not in _READERS]
@@ -145,10 +144,7 @@ def _description(said: dict[str, Any], path: Path) -> Description:
 
 
 def _labels(path: Path) -> tuple[str, ...]:
-    try:
-        labels = names_by_line(read_utf8(path))
-    except ValueError as error:
-        raise ValueError(f"{path.name}, a file of labels, with {error}") from error
+    labels = names_by_line(read_text(path, "a file of labels", ModelError))
     if not labels:
         raise ValueError(f"no label in {path.name}")
     return labels
@@ -166,9 +162,9 @@ def times(size_px: tuple[int, int]) -> str:
 def _classes(key: str, value: object) -> str | tuple[str, ...]:
     if isinstance(value, str):
         return value
-    if not isinstance(value, list) or not value or any(isinstance(label, dict | list | None) for label in value):
+    if not isinstance(value, list) or not value:
         raise ValueError(f"{key} that are neither a list of labels nor a file's name")
-    return tuple(str(label) for label in value)
+    return names_in_list(value)
 
 
 def _size(key: str, value: object) -> tuple[int, int]:

@@ -14,6 +14,7 @@ import numpy as np
 
 from standoff.core.homography import FloatArray
 from standoff.core.telemetry import Telemetry
+from standoff.files.plain_text import UnknownEncoding, decoded
 from standoff.stages.frames.flight_text import UnreadableText, dialect_of, read_block
 from standoff.stages.frames.instruments import PROFESSIONAL, InstrumentErrors, telemetry_of
 
@@ -195,12 +196,21 @@ def read_flight_log(path: Path) -> FlightLog | NoFlightLog:
     try:
         if path.stat().st_size > _LARGEST_BYTES:
             raise UnreadableText("it is too large for a drone's log")
-        text = path.read_text(encoding="utf-8-sig", errors="replace")
-        return _parsed(path.name, text)
+        return _parsed(path.name, _text(path.read_bytes()))
     except OSError as error:
         return NoFlightLog(path.name, f"it cannot be read ({error.strerror})")
     except UnreadableText as error:
         return NoFlightLog(path.name, str(error))
+
+
+def _text(content: bytes) -> str:
+    """Return a log's text; letters of another 8-bit alphabet in it, beside its numbers, do no harm."""
+    try:
+        return decoded(content)
+    except UnknownEncoding as encoding:
+        if "UTF" in str(encoding):
+            raise UnreadableText(f"it is in {encoding}, not in UTF-8") from encoding
+        return content.decode("utf-8-sig", errors="replace")
 
 
 def _parsed(name: str, text: str) -> FlightLog:

@@ -16,12 +16,14 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from standoff.core.errors import SourceError
+from standoff.core.errors import GroundError, SourceError
 from standoff.core.homography import FloatArray
 from standoff.core.types import ImageArray
 from standoff.files.lfs import refuse_pointer
 
 PICTURE_SUFFIXES = (".bmp", ".jpeg", ".jpg", ".png", ".tif", ".tiff", ".webp")
+_SMALLEST_SQUARE_M, _LARGEST_SQUARE_M = 0.001, 2.0
+"""From boards for microscopes to boards painted on the ground."""
 _WINDOW_OF_SQUARE = 0.3
 _SUBPIXEL_STOP = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 100, 1e-4)
 
@@ -45,6 +47,22 @@ class BoardView:
     def found(self) -> bool:
         """Whether the whole board was found."""
         return self.corners_px.size > 0
+
+
+def check_square(square_m: float) -> None:
+    """Refuse a square that no board has: a side in another unit.
+
+    Raises:
+        GroundError: It is; says which unit is likely.
+    """
+    if not (square_m > 0 and np.isfinite(square_m)):
+        raise GroundError(expected="a square with a positive side", found=f"{square_m} m", fix="measure one square")
+    if not _SMALLEST_SQUARE_M <= square_m <= _LARGEST_SQUARE_M:
+        raise GroundError(
+            expected=f"squares of {1000 * _SMALLEST_SQUARE_M:g} to {1000 * _LARGEST_SQUARE_M:g} mm",
+            found=f"{1000 * square_m:g} mm, likely in {'metres' if square_m < _SMALLEST_SQUARE_M else 'micrometres'}",
+            fix="give the side of one square in millimetres",
+        )
 
 
 def find_corners(gray: ImageArray, pattern: tuple[int, int]) -> FloatArray:
@@ -77,7 +95,7 @@ def read_boards(pictures: Path | str | Iterable[Path], pattern: tuple[int, int])
 
     Args:
         pictures: A folder, whose pictures are taken in the order of their names and whose other files are
-            left alone; or picture files.
+            left alone; or picture files. They are taken as the sensor has them, however EXIF data say to turn them.
         pattern: (columns, rows) of inner corners.
 
     Returns:
@@ -112,7 +130,9 @@ def _read_view(path: Path, pattern: tuple[int, int]) -> BoardView:
         data = np.frombuffer(path.read_bytes(), dtype=np.uint8)
     except OSError as error:
         raise SourceError(expected="a picture", found=f"{path}: {error.strerror}", fix="check the path") from None
-    gray = cv2.imdecode(data, cv2.IMREAD_GRAYSCALE) if data.size else None
+    # As the sensor has it: one that was held upright for some pictures has one lens, and its axis one place.
+    flags = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION
+    gray = cv2.imdecode(data, flags) if data.size else None
     if gray is None:
         refuse_pointer(path, f"a picture in {path}", SourceError)
         fix = "replace the file or take it out of the folder"

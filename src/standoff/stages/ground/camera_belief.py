@@ -128,7 +128,10 @@ class CameraBelief:
         """Carry the belief to a frame by motion, and learn from it of the lens; the moment is then held."""
         moment.held = self._filter.predict(moment.frame.time_s, moment.motion)
         told = moment.motion.distortion if isinstance(moment.motion, CameraMotion) else None
-        if told is not None and (self._heard is None or told.sigma < _NEWS * self._heard.sigma):
+        # What the motion tells is the k1 of another kind of lens than a fisheye.
+        if told is None or self._prior.camera.lens == "fisheye":
+            return
+        if self._heard is None or told.sigma < _NEWS * self._heard.sigma:
             self._hear(told)
 
     def _hear(self, told: RadialDistortion) -> None:

@@ -1,4 +1,4 @@
-"""Camera files: OpenCV's own (YAML, XML or JSON, as its calibration sample writes) and a plain YAML.
+"""Camera files: a plain YAML, and those of OpenCV, ROS, Kalibr and OpenDroneMap (`foreign_cameras`).
 
 The plain file holds the size of the pictures and either single numbers or lists:
 
@@ -13,54 +13,70 @@ The plain file holds the size of the pictures and either single numbers or lists
     p1: 0.0018
     p2: -0.0003
     k3: 0.238
+    lens: brown          # or fisheye, the equidistant model of cv2.fisheye, with k1 to k4 alone
 
 An entry `calibration` may say where the numbers come from; it is not read.
 """
 
 from __future__ import annotations
 
-import contextlib
-import os
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Final, get_args
 
-import cv2
 import numpy as np
-import yaml
 
-from standoff.core.camera import Camera
+from standoff.core.camera import COEFFICIENTS, Camera, Lens
 from standoff.core.errors import GroundError, OutputError
 from standoff.core.homography import FloatArray
-from standoff.stages.ground.yaml_file import check_keys, numbers, parse_mapping, read_text
+from standoff.files.json_text import parse_json
+from standoff.files.plain_text import read_text
+from standoff.files.yaml_text import parse_yaml, write_yaml
+from standoff.stages.ground.foreign_cameras import Stated, foreign_reader, missing_size, opencv_xml, opencv_yaml
+from standoff.stages.ground.yaml_file import as_mapping, check_keys, numbers
 
 _WHAT = "a camera file"
 _PINHOLE = ("fx", "fy", "cx", "cy")
-_DISTORTION = ("k1", "k2", "p1", "p2", "k3")
-_PLAIN_KEYS = ("width_px", "height_px", *_PINHOLE, *_DISTORTION, "matrix", "distortion", "calibration")
-_OPENCV_WIDTH = ("image_width", "image_Width")
-_OPENCV_HEIGHT = ("image_height", "image_Height")
-_OPENCV_MATRIX = ("camera_matrix", "Camera_Matrix", "cameraMatrix")
-_OPENCV_DISTORTION = ("distortion_coefficients", "Distortion_Coefficients", "distCoeffs")
+_DISTORTION: Final[Mapping[Lens, tuple[str, ...]]] = {
+    "brown": ("k1", "k2", "p1", "p2", "k3"),
+    "fisheye": ("k1", "k2", "k3", "k4"),
+}
+_PLAIN_KEYS = ("width_px", "height_px", *_PINHOLE, "matrix", "distortion", "lens", "calibration")
+
+_SHORTEST: Final[Mapping[Lens, float]] = {"brown": 0.2, "fisheye": 0.1}
+"""Focal lengths in longer sides of the picture: no lens that keeps lines straight sees more than 136 degrees; of a
+fisheye's whole circle even a small one in the picture's middle is longer."""
+_LONGEST: Final = 50.0
+"""One that sees a degree: no drone's does."""
+_MOST_OBLONG: Final = 2.0
+"""Of pixels: anamorphic lenses and broadcast pictures stay below."""
+_CENTRAL: Final = 0.1
+"""The lens's axis is no nearer to the picture's edge, as a share of its side: few lie 5 % off the middle."""
 
 
 def load_camera(path: Path | str) -> Camera:
     """Read a camera file.
 
     Args:
-        path: OpenCV's YAML, XML or JSON, or the plain YAML of this module's head.
+        path: The plain YAML of this module's head; OpenCV's YAML, XML or JSON, as its calibration sample writes; ROS's
+            camera_info YAML; Kalibr's camchain; OpenDroneMap's cameras.json.
 
     Raises:
-        GroundError: It does not describe a pinhole camera with at most five distortion coefficients.
+        GroundError: It does not describe a camera whose lens is known here, or one that cannot be.
     """
     path = Path(path)
-    text = read_text(path, _WHAT)
-    if path.suffix.lower() in (".xml", ".json") or text.lstrip().startswith(("%YAML", "<?xml")):
-        size, matrix, distortion = _read_opencv(text, path)
-    else:
-        size, matrix, distortion = _read_plain(parse_mapping(text, path, _WHAT), path)
-    return _checked_camera(size, matrix, distortion, path)
+    text = read_text(path, _WHAT, GroundError)
+    content = _content(text, path)
+    read = foreign_reader(content) or _read_plain
+    return _checked_camera(read(content, path), path)
+
+
+def _content(text: str, path: Path) -> Mapping[str, Any]:
+    if text.lstrip().startswith("<"):
+        return opencv_xml(text.lstrip(), path)
+    if path.suffix.lower() == ".json":
+        return as_mapping(parse_json(text, _WHAT, str(path), GroundError), _WHAT, path)
+    return as_mapping(parse_yaml(opencv_yaml(text), _WHAT, str(path), GroundError), _WHAT, path)
 
 
 def save_camera(camera: Camera, path: Path | str, *, calibration: Mapping[str, Any] | None = None) -> None:
@@ -77,30 +93,29 @@ def save_camera(camera: Camera, path: Path | str, *, calibration: Mapping[str, A
     path = Path(path)
     content: dict[str, Any] = {"width_px": camera.width_px, "height_px": camera.height_px}
     content |= dict(zip(_PINHOLE, camera.matrix[[0, 1, 0, 1], [0, 1, 2, 2]].tolist(), strict=True))
-    content |= dict(zip(_DISTORTION, camera.distortion.tolist(), strict=True))
+    if camera.lens != "brown":
+        content["lens"] = camera.lens
+    content |= dict(zip(_DISTORTION[camera.lens], camera.distortion.tolist(), strict=True))
     if calibration:
         content["calibration"] = dict(calibration)
-    text = yaml.safe_dump(content, sort_keys=False)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile("w", dir=path.parent, encoding="utf-8", delete=False) as partial:
-            partial.write(text)
-        try:
-            Path(partial.name).chmod(0o644)
-            os.replace(partial.name, path)  # noqa: PTH105
-        except OSError:
-            Path(partial.name).unlink()
-            raise
     except OSError as error:
         found = f"{path}: {error.strerror}"
         raise OutputError(expected="a camera file to write", found=found, fix="choose another path") from None
+    write_yaml(path, content)
 
 
-def _read_plain(content: Mapping[str, Any], path: Path) -> tuple[FloatArray, FloatArray, FloatArray]:
-    check_keys(content, _PLAIN_KEYS, str(path))
+def _read_plain(content: Mapping[str, Any], path: Path) -> Stated:
+    lens: Lens = content.get("lens", "brown")
+    if lens not in get_args(Lens):
+        expected = f"one of the lenses {', '.join(get_args(Lens))}"
+        raise GroundError(expected=expected, found=f"{lens!r} in {path}", fix="calibrate with one of these models")
+    coefficients = _DISTORTION[lens]
+    check_keys(content, (*_PLAIN_KEYS, *coefficients), f"{path}, whose lens is {lens}")
     if "width_px" not in content or "height_px" not in content:
-        raise _missing_size(path, "width_px and height_px")
-    size = numbers([content["width_px"], content["height_px"]], (2,), f"width_px and height_px in {path}")
+        raise missing_size(path, "width_px and height_px")
+    size_px = numbers([content["width_px"], content["height_px"]], (2,), f"width_px and height_px in {path}")
     if "matrix" in content:
         _refuse_both(content, "matrix", _PINHOLE, path)
         matrix = numbers(content["matrix"], (3, 3), f"matrix in {path}")
@@ -112,12 +127,12 @@ def _read_plain(content: Mapping[str, Any], path: Path) -> tuple[FloatArray, Flo
         fx, fy, cx, cy = numbers([content[key] for key in _PINHOLE], (4,), f"fx, fy, cx, cy in {path}")
         matrix = np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
     if "distortion" in content:
-        _refuse_both(content, "distortion", _DISTORTION, path)
+        _refuse_both(content, "distortion", coefficients, path)
         distortion = numbers(content["distortion"], (-1,), f"distortion in {path}")
     else:
-        values = [content.get(key, 0.0) for key in _DISTORTION]
-        distortion = numbers(values, (5,), f"k1, k2, p1, p2, k3 in {path}")
-    return size, matrix, distortion
+        values = [content.get(key, 0.0) for key in coefficients]
+        distortion = numbers(values, (len(values),), f"{', '.join(coefficients)} in {path}")
+    return Stated(size_px, matrix, distortion, lens)
 
 
 def _refuse_both(content: Mapping[str, Any], whole: str, single: tuple[str, ...], path: Path) -> None:
@@ -127,90 +142,71 @@ def _refuse_both(content: Mapping[str, Any], whole: str, single: tuple[str, ...]
         raise GroundError(expected=f"either {whole} or {', '.join(twice)}", found=found, fix="remove one of them")
 
 
-def _read_opencv(text: str, path: Path) -> tuple[FloatArray, FloatArray, FloatArray]:
-    try:
-        storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
-    except (cv2.error, SystemError):
-        raise _not_opencv(path) from None
-    with contextlib.closing(_Storage(storage, path)) as file:
-        width, height = file.number(_OPENCV_WIDTH), file.number(_OPENCV_HEIGHT)
-        if width is None or height is None:
-            raise _missing_size(path, "image_width and image_height")
-        matrix, distortion = file.matrix(_OPENCV_MATRIX), file.matrix(_OPENCV_DISTORTION)
-    size = numbers([width, height], (2,), f"image_width and image_height in {path}")
-    return size, numbers(matrix, (3, 3), f"the camera matrix in {path}"), distortion.ravel()
-
-
-class _Storage:
-    """An open OpenCV file: looks a key up under the spellings that OpenCV's own samples have used."""
-
-    def __init__(self, storage: Any, path: Path) -> None:  # noqa: ANN401 - cv2 has no types
-        self._storage, self._path = storage, path
-
-    def number(self, keys: tuple[str, ...]) -> float | None:
-        nodes = [self._storage.getNode(key) for key in keys]
-        return next((float(node.real()) for node in nodes if node.isInt() or node.isReal()), None)
-
-    def matrix(self, keys: tuple[str, ...]) -> FloatArray:
-        node = next((n for n in (self._storage.getNode(key) for key in keys) if not n.empty()), None)
-        if node is None:
-            found = f"{self._path} without it"
-            raise GroundError(expected=f"an entry {keys[0]}", found=found, fix="add it, or use the plain camera file")
-        try:
-            value = node.mat()
-        except cv2.error:
-            value = None
-        if value is None:
-            raise _not_opencv(self._path)
-        array: FloatArray = np.asarray(value, dtype=np.float64)
-        return array
-
-    def close(self) -> None:
-        self._storage.release()
-
-
-def _not_opencv(path: Path) -> GroundError:
-    return GroundError(
-        expected="an OpenCV camera file (FileStorage)",
-        found=f"{path}, which OpenCV cannot read",
-        fix="write it with cv2.FileStorage, or use the plain camera file",
-    )
-
-
-def _missing_size(path: Path, keys: str) -> GroundError:
-    return GroundError(
-        expected=f"{keys} in the camera file, the size of the pictures that it was calibrated on",
-        found=f"{path} without them",
-        fix=f"add {keys}",
-    )
-
-
-def _checked_camera(size: FloatArray, matrix: FloatArray, distortion: FloatArray, path: Path) -> Camera:
-    width_px, height_px = size
-    if (size < 1).any() or (size != np.round(size)).any():
+def _checked_camera(stated: Stated, path: Path) -> Camera:
+    (width_px, height_px), matrix = stated.size_px, stated.matrix
+    if (stated.size_px < 1).any() or (stated.size_px != np.round(stated.size_px)).any():
         found = f"{width_px:g}x{height_px:g} in {path}"
         raise GroundError(expected="a picture size in whole pixels", found=found, fix="correct the file")
-    if len(distortion) > 5 and np.any(distortion[5:]):
-        raise GroundError(
-            expected="at most five distortion coefficients: k1, k2, p1, p2, k3",
-            found=f"{len(distortion)} in {path} (a rational, thin-prism or tilted model)",
-            fix="calibrate again with the five-coefficient model (standoff calibrate)",
-        )
-    if len(distortion) not in (0, 4, 5, 8, 12, 14):
-        found = f"{len(distortion)} in {path}"
-        raise GroundError(expected="0, 4 or 5 distortion coefficients", found=found, fix="correct the file")
-    five = np.zeros(5)
-    five[: len(distortion)] = distortion[:5]
     if matrix[0, 1] != 0 or matrix[1, 0] != 0 or (matrix[2] != [0, 0, 1]).any():
         expected = "a camera matrix [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] without skew"
         raise GroundError(expected=expected, found=f"{matrix.tolist()} in {path}", fix="correct the file")
-    if not ((matrix[:2, 2] > 0) & (matrix[:2, 2] < size)).all():
+    _check_focal(stated, path)
+    share = (matrix[:2, 2] + 0.5) / stated.size_px
+    if not ((share > _CENTRAL) & (share < 1.0 - _CENTRAL)).all():
         raise GroundError(
-            expected=f"cx, cy inside the {width_px:g}x{height_px:g} picture",
+            expected=f"cx, cy in the middle of the {width_px:g}x{height_px:g} picture",
             found=f"{matrix[0, 2]:g}, {matrix[1, 2]:g} in {path}",
-            fix="give the size of the pictures that the camera was calibrated on",
+            fix="give the size of the pictures that the camera was calibrated on, and cx, cy in pixels",
         )
+    distortion = _all_coefficients(stated, path)
     try:
-        return Camera(int(width_px), int(height_px), matrix, five)
+        return Camera(int(width_px), int(height_px), matrix, distortion, stated.lens)
     except ValueError as error:
-        raise GroundError(expected="a pinhole camera", found=f"{path}: {error}", fix="correct the file") from None
+        raise GroundError(expected="a camera", found=f"{path}: {error}", fix="correct the file") from None
+
+
+def _check_focal(stated: Stated, path: Path) -> None:
+    """Refuse focal lengths that are in no pixels of such a picture, and say what they are likely in."""
+    fx, fy = np.diag(stated.matrix)[:2].tolist()
+    if min(fx, fy) <= 0.0:
+        raise GroundError(expected="focal lengths above 0", found=f"{fx:g}, {fy:g} in {path}", fix="correct the file")
+    longer_px = float(stated.size_px.max())
+    for name, focal in (("fx", fx), ("fy", fy)):
+        if not _SHORTEST[stated.lens] <= focal / longer_px <= _LONGEST:
+            raise GroundError(
+                expected=f"{name} in pixels, of which the picture is {longer_px:g} long",
+                found=f"{focal:g} in {path}, {_likely_unit(focal, longer_px)}",
+                fix="multiply millimetres by the picture's width in pixels and divide by the sensor's in millimetres",
+            )
+    if not 1.0 / _MOST_OBLONG < fx / fy < _MOST_OBLONG:
+        found = f"{fx:g} and {fy:g} in {path}"
+        raise GroundError(expected="fx and fy of about square pixels", found=found, fix="correct the file")
+
+
+def _likely_unit(focal: float, longer_px: float) -> str:
+    if focal > longer_px:
+        return "likely of a far larger picture"
+    if focal < 0.3:
+        return "likely in metres"
+    if focal < 3.0:
+        return "likely a share of the picture's width"
+    return "likely in millimetres" if focal < 200.0 else "likely of a smaller picture"
+
+
+def _all_coefficients(stated: Stated, path: Path) -> FloatArray:
+    """Return as many coefficients as the lens has, zeros where the file leaves them out."""
+    count, given = COEFFICIENTS[stated.lens], stated.distortion
+    if stated.lens == "brown" and len(given) > count and np.any(given[count:]):
+        raise GroundError(
+            expected="at most five distortion coefficients: k1, k2, p1, p2, k3",
+            found=f"{len(given)} in {path} (a rational, thin-prism or tilted model)",
+            fix="calibrate again with the five-coefficient model (standoff calibrate)",
+        )
+    allowed = {"brown": (0, 4, 5, 8, 12, 14), "fisheye": (0, 4)}[stated.lens]
+    if len(given) not in allowed:
+        wanted = "0, 4 or 5" if stated.lens == "brown" else "0 or 4"
+        expected = f"{wanted} distortion coefficients of a {stated.lens} lens"
+        raise GroundError(expected=expected, found=f"{len(given)} in {path}", fix="correct the file")
+    distortion = np.zeros(count)
+    distortion[: min(len(given), count)] = given[:count]
+    return distortion

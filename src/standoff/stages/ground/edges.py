@@ -72,13 +72,32 @@ class Edges:
     def undistorted(self, camera: Camera | None) -> Edges:
         """Return the points as an ideal pinhole camera would see them, where straight edges are straight.
 
-        The directions stay as they are: a lens turns them by far less than their noise.
+        Only a fisheye turns the gradients: other lenses do so by far less than their noise.
         """
         if camera is None:
             return self
         points = camera.undistort(self.points_px)
         known = np.isfinite(points).all(axis=1)
-        return Edges(points[known], self.gradient[known])
+        points, gradient = points[known], self.gradient[known]
+        if camera.lens == "fisheye":
+            gradient = _straightened(gradient, points, camera)
+        return Edges(points, gradient)
+
+
+def _straightened(gradient: FloatArray, points_px: FloatArray, camera: Camera) -> FloatArray:
+    """Return gradients (N, 2) as an ideal pinhole camera would see them, as strong as they are.
+
+    Args:
+        gradient: As seen through the lens.
+        points_px: (N, 2) where, undistorted.
+        camera: The lens.
+    """
+    focal = np.diag(camera.matrix)[:2]
+    _, bent_by_straight = camera.distorted_with_jacobian((points_px - camera.matrix[:2, 2]) / focal)
+    turned = ((gradient * focal)[:, None] @ bent_by_straight)[:, 0] / focal
+    strength = np.linalg.norm(gradient, axis=1, keepdims=True) / np.linalg.norm(turned, axis=1, keepdims=True)
+    straightened: FloatArray = turned * strength
+    return straightened
 
 
 def sobel_gradients(gray: ImageArray, box_xyxy_px: FloatArray) -> Gradients | None:

@@ -142,8 +142,11 @@ def first_fit(
 
 def _starts(seen: PointObservation, camera: Camera) -> list[View]:
     """Return the one or two views that see the points of a plane about so (Collins and Bartoli 2014)."""
+    pinhole_px = camera.undistort(seen.points_px)
+    if not np.isfinite(pinhole_px).all():
+        return []
     count, turns, shifts, _ = cv2.solvePnPGeneric(
-        seen.points_m, seen.points_px, camera.matrix, camera.distortion, flags=cv2.SOLVEPNP_IPPE
+        seen.points_m, pinhole_px, camera.matrix, None, flags=cv2.SOLVEPNP_IPPE
     )
     views = []
     for turn, shift in zip(turns[:count], shifts[:count], strict=True):

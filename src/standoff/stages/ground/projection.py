@@ -1,19 +1,23 @@
 """What a `View` projects, compiled: of some hundred points at most, where numpy takes longer to begin than to work.
 
-The formulas are those of `standoff.core.pose` and `standoff.core.camera`, which must do without a compiler; a test
-holds the two together.
+The formulas are those of `standoff.core.pose` and `standoff.core.distortion`, which must do without a compiler; a test
+holds the two together. A lens is told by its coefficients: five are Brown and Conrady's, four a fisheye's.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from standoff.core.camera import COEFFICIENTS
 from standoff.core.compiled import compiled
 from standoff.core.homography import FloatArray
 from standoff.core.pose import CHANGES, View
 
 _UNDISTORT_ITERATIONS, _UNDISTORT_TOLERANCE, _UNDISTORTED = 50, 1e-12, 1e-9
 """Of Newton's method as in `Camera.undistort`, in normalised coordinates."""
+_FISHEYE = COEFFICIENTS["fisheye"]
+_CENTRE = 1e-12
+"""As in `standoff.core.distortion`."""
 
 Eye = tuple[FloatArray, FloatArray, FloatArray, FloatArray, float]
 
@@ -21,8 +25,8 @@ Eye = tuple[FloatArray, FloatArray, FloatArray, FloatArray, float]
 def eye_of(view: View) -> Eye:
     """Return what compiled loops take for a view.
 
-    That is its position (3,), its rotation (3, 3), its camera matrix (3, 3), its distortion (5,), and the square of
-    the radius at which the lens's polynomial first turns back.
+    That is its position (3,), its rotation (3, 3), its camera matrix (3, 3), its distortion (5,) or (4,), and the
+    square of the radius at which the lens's polynomial first turns back.
     """
     camera = view.camera
     return view.position_m, view.site_to_camera, camera.matrix, camera.distortion, camera.first_fold_r2()
@@ -115,7 +119,7 @@ def projected(
                 moved = by_camera[0] * rotation[0, k] + by_camera[1] * rotation[1, k] + by_camera[2] * rotation[2, k]
                 by_point[n, axis, k], by_view[n, axis, 3 + k] = moved, -moved
             by_view[n, axis, 6] = focal * bent[axis]
-            by_view[n, axis, 7] = focal * (x * x + y * y) * (x if axis == 0 else y)
+            by_view[n, axis, 7] = focal * _by_k1(x * x + y * y, distortion) * (x if axis == 0 else y)
     return pixels, by_view, by_point
 
 
@@ -174,6 +178,8 @@ def turned_by(vector: FloatArray, rotation: FloatArray) -> FloatArray:
 @compiled
 def _straighten(x: float, y: float, distortion: FloatArray, first_fold_r2: float, straight: FloatArray) -> bool:
     """Fill in (2,) the direction that the lens bends to x, y, by Newton's method; return whether there is one."""
+    if len(distortion) == _FISHEYE:
+        return _straighten_fisheye(x, y, distortion, first_fold_r2, straight)
     bent, slope = np.empty(2), np.empty((2, 2))
     straight[0], straight[1] = x, y
     for _ in range(_UNDISTORT_ITERATIONS):
@@ -193,6 +199,30 @@ def _straighten(x: float, y: float, distortion: FloatArray, first_fold_r2: float
 
 
 @compiled
+def _straighten_fisheye(x: float, y: float, distortion: FloatArray, first_fold_r2: float, straight: FloatArray) -> bool:
+    """Do what `_straighten` does for a fisheye, by the angle off the axis."""
+    radius, largest = np.sqrt(x * x + y * y), np.arctan(np.sqrt(first_fold_r2))
+    low, high, angle = 0.0, largest, min(radius, largest)
+    for _ in range(_UNDISTORT_ITERATIONS):
+        value, slope = _fisheye_radius(angle, distortion)
+        off = value - radius
+        # Not a number ends it, too.
+        if not abs(off) > _UNDISTORT_TOLERANCE:
+            break
+        if off < 0.0:
+            low = angle
+        else:
+            high = angle
+        angle -= off / slope if slope != 0.0 else np.inf
+        if not low < angle < high:
+            angle = (low + high) / 2.0
+    stretch = np.tan(angle) / radius if radius > 0.0 else 1.0
+    straight[0], straight[1] = x * stretch, y * stretch
+    found: bool = angle < largest and abs(_fisheye_radius(angle, distortion)[0] - radius) < _UNDISTORTED
+    return found
+
+
+@compiled
 def _to_camera(point_m: FloatArray, position_m: FloatArray, rotation: FloatArray, in_camera: FloatArray) -> None:
     """Fill in (3,) the point to the right, down and ahead of the camera."""
     for axis in range(3):
@@ -204,8 +234,19 @@ def _to_camera(point_m: FloatArray, position_m: FloatArray, rotation: FloatArray
 @compiled
 def _bend(x: float, y: float, distortion: FloatArray, bent: FloatArray, slope: FloatArray) -> None:
     """Fill in (2,) a direction x / z, y / z as the lens bends it, and (2, 2) the derivative."""
-    k1, k2, p1, p2, k3 = distortion[0], distortion[1], distortion[2], distortion[3], distortion[4]
     r2 = x * x + y * y
+    if len(distortion) == _FISHEYE:
+        radial, across = 1.0, 2.0 * distortion[0] - 2.0 / 3.0
+        if r2 >= _CENTRE:
+            radius = np.sqrt(r2)
+            bent_radius, steepness = _fisheye_radius(np.arctan(radius), distortion)
+            radial = bent_radius / radius
+            across = (steepness / (1.0 + r2) - radial) / r2
+        bent[0], bent[1] = x * radial, y * radial
+        slope[0, 0], slope[1, 1] = radial + x * x * across, radial + y * y * across
+        slope[0, 1] = slope[1, 0] = x * y * across
+        return
+    k1, k2, p1, p2, k3 = distortion[0], distortion[1], distortion[2], distortion[3], distortion[4]
     radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
     growth = k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3)
     bent[0] = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)
@@ -213,3 +254,22 @@ def _bend(x: float, y: float, distortion: FloatArray, bent: FloatArray, slope: F
     slope[0, 0] = radial + 2.0 * x * x * growth + 2.0 * p1 * y + 6.0 * p2 * x
     slope[0, 1] = slope[1, 0] = 2.0 * x * y * growth + 2.0 * p1 * x + 2.0 * p2 * y
     slope[1, 1] = radial + 2.0 * y * y * growth + 6.0 * p1 * y + 2.0 * p2 * x
+
+
+@compiled
+def _fisheye_radius(angle: float, distortion: FloatArray) -> tuple[float, float]:
+    """Return the radius in the picture of an angle off the axis, and its derivative."""
+    k1, k2, k3, k4 = distortion[0], distortion[1], distortion[2], distortion[3]
+    a2 = angle * angle
+    radius = angle * (1.0 + a2 * (k1 + a2 * (k2 + a2 * (k3 + a2 * k4))))
+    return radius, 1.0 + a2 * (3.0 * k1 + a2 * (5.0 * k2 + a2 * (7.0 * k3 + a2 * 9.0 * k4)))
+
+
+@compiled
+def _by_k1(r2: float, distortion: FloatArray) -> float:
+    """Return the derivative of a bent direction by k1, as a share of the direction, whose squared radius is given."""
+    if len(distortion) != _FISHEYE:
+        return r2
+    radius = np.sqrt(r2)
+    by_k1: float = np.arctan(radius) ** 3 / radius if r2 >= _CENTRE else r2
+    return by_k1

@@ -18,6 +18,7 @@ from standoff.stages.ground.size_fit import Posterior, fit, poses
 from standoff.stages.ground.size_window import MotionChain, SizeWindow
 
 TOO_FEW = "too few people were seen standing at different places"
+FISHEYE = "people's boxes through a fisheye lens do not tell their sizes; give a reference, a survey or markers"
 NOT_A_PLANE = "the sizes of people do not fit one level ground"
 
 _EVERY_S = 0.45
@@ -104,6 +105,9 @@ class SizesEstimator:
         Returns:
             The answer of the last frame whose boxes were looked at, or why there is none.
         """
+        # Away from the middle of such a picture people lean and stretch: their boxes miss their heights by a third.
+        if self._prior.camera.lens == "fisheye":
+            return NoSizes(FISHEYE)
         moved = None if isinstance(motion, NoCameraMotion) else self._chain.follow(time_s, motion)
         if moved is None:
             self.reset()

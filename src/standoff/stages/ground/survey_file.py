@@ -31,7 +31,7 @@ from standoff.core.homography import FloatArray
 from standoff.stages.ground.camera_file import load_camera
 from standoff.stages.ground.geographic import east_north_m, look_like_degrees
 from standoff.stages.ground.surveyed import SurveyedGround
-from standoff.stages.ground.yaml_file import check_keys, numbers, parse_mapping, read_text
+from standoff.stages.ground.yaml_file import check_keys, numbers, read_mapping
 
 _WHAT = "a survey file"
 _KEYS = ("image_size_px", "points", "camera", "area_px", "point_sigma_px", "time_s")
@@ -48,7 +48,7 @@ def load_survey(path: Path | str, *, camera: Camera | None = None) -> SurveyedGr
         GroundError: The file is not a survey, or its points do not define a map.
     """
     path = Path(path)
-    content = parse_mapping(read_text(path, _WHAT), path, _WHAT)
+    content = read_mapping(path, _WHAT)
     check_keys(content, _KEYS, str(path))
     points = _points(content, path)
     if camera is None and content.get("camera") is not None:

@@ -7,48 +7,34 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from standoff.core.errors import GroundError
 from standoff.core.homography import FloatArray
+from standoff.files.yaml_text import read_yaml
 
 
-def read_text(path: Path, what: str) -> str:
-    """Return a file's text.
+def read_mapping(path: Path, what: str) -> Mapping[str, Any]:
+    """Return the YAML mapping in a file.
 
     Args:
         path: The file.
-        what: What it should be, for the error ("a camera file").
+        what: What it should be, for the error ("a survey file").
 
     Raises:
-        GroundError: It does not exist, cannot be read, or is not text.
+        GroundError: It cannot be read, is not YAML, or not a mapping.
     """
-    try:
-        return path.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise GroundError(expected=f"{what} at {path}", found="no such file", fix="check the path") from None
-    except UnicodeDecodeError:
-        raise GroundError(expected=f"{what} at {path}", found="a binary file", fix="give a text file") from None
-    except OSError as error:
-        found = error.strerror or type(error).__name__
-        raise GroundError(expected=f"{what} at {path}", found=found, fix="check the path and its permissions") from None
+    return as_mapping(read_yaml(path, what, GroundError), what, path)
 
 
-def parse_mapping(text: str, path: Path, what: str) -> Mapping[str, Any]:
-    """Return the YAML mapping in a text.
+def as_mapping(content: object, what: str, path: Path) -> Mapping[str, Any]:
+    """Return what a file says, keys as texts.
 
     Raises:
-        GroundError: The text is not YAML, or not a mapping.
+        GroundError: It is not a mapping.
     """
-    try:
-        content = yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        where = f", line {mark.line + 1}" if mark is not None else ""
-        raise GroundError(expected=f"{what}", found=f"{path}{where}: not YAML", fix="correct the file") from None
     if not isinstance(content, dict):
         found = f"{path}: {'nothing' if content is None else 'no keys'}"
-        raise GroundError(expected=f"{what}: a YAML mapping of keys to values", found=found, fix="correct the file")
+        raise GroundError(expected=f"{what}: a mapping of keys to values", found=found, fix="correct the file")
     return {str(key): value for key, value in content.items()}
 
 

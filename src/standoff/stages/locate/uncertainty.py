@@ -73,7 +73,7 @@ def map_jacobian(ground: GroundMap, undistorted_px: FloatArray) -> FloatArray:
     focal = np.array([ground.camera.matrix[0, 0], ground.camera.matrix[1, 1]])
     normalised = (undistorted_px - ground.camera.matrix[:2, 2]) / focal
     # More k1 moves the picture of a direction outwards, so a fixed place in the picture is of one further in.
-    seen_by_k1 = normalised * (normalised**2).sum(axis=1, keepdims=True) * focal
+    seen_by_k1 = ground.camera.distorted_by_k1(normalised) * focal
     by_point = homography.point_jacobian(ground.image_to_ground, undistorted_px)
     by_k1 = -by_point @ undistortion_jacobian(ground.camera, undistorted_px) @ seen_by_k1[:, :, None]
     return np.concatenate([by_entries, by_k1], axis=2)

@@ -13,7 +13,7 @@ _BORDER = 9
 
 
 class Lens:
-    """A camera's distortion, by OpenCV where the whole picture can be undistorted, as almost always.
+    """A camera's distortion, by OpenCV where the lens is no fisheye and the whole picture can be undistorted.
 
     Args:
         camera: At the size of the frames; None: no distortion.
@@ -23,7 +23,8 @@ class Lens:
     def __init__(self, camera: Camera | None, size_px: tuple[int, int]) -> None:
         self.camera = camera
         self._quick = False
-        if camera is None:
+        # OpenCV's quick functions know Brown and Conrady's lenses; a fisheye's own inverse is quick enough.
+        if camera is None or camera.lens == "fisheye":
             return
         share = np.linspace(0.0, 1.0, _BORDER)
         zero, one = np.zeros(_BORDER), np.ones(_BORDER)

@@ -13,7 +13,7 @@ from typing import Final, Literal, cast, get_args
 
 from standoff.core.errors import ModelError
 from standoff.files.lfs import refuse_pointer
-from standoff.files.utf8_text import read_utf8, refuse_no_text
+from standoff.files.plain_text import UnknownEncoding, decoded, read_text
 
 Activation = Literal["linear", "leaky", "logistic", "relu", "relu6", "mish", "swish"]
 
@@ -209,14 +209,14 @@ def read_cfg_text(path: Path) -> str:
     refuse_pointer(path, what, ModelError)
     try:
         content = path.read_bytes()
-        refuse_no_text(content)
     except OSError as error:
-        raise _unreadable(what, error) from error
-    except ValueError as error:
-        raise ModelError(expected=what, found=str(error), fix="save the file as UTF-8, or check the path") from error
+        raise ModelError(expected=what, found=error.strerror or type(error).__name__, fix="check the path") from error
     try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError:
+        return decoded(content)
+    except UnknownEncoding as error:
+        if not error.is_eight_bit:
+            fix = "save the file as UTF-8, or check the path"
+            raise ModelError(expected=what, found=str(error), fix=fix) from error
         # Every byte is a letter of Latin-1, so the text survives; whatever is not ASCII is no option of Darknet.
         return content.decode("latin-1")
 
@@ -227,15 +227,5 @@ def read_names_text(path: Path) -> str:
     Raises:
         ModelError: It cannot be read; names the encoding where it is not UTF-8.
     """
-    what = f"a names file in UTF-8 at {path}"
-    refuse_pointer(path, what, ModelError)
-    try:
-        return read_utf8(path)
-    except OSError as error:
-        raise _unreadable(what, error) from error
-    except ValueError as error:
-        raise ModelError(expected=what, found=str(error), fix="save the file as UTF-8") from error
-
-
-def _unreadable(what: str, error: OSError) -> ModelError:
-    return ModelError(expected=what, found=error.strerror or type(error).__name__, fix="check the path")
+    refuse_pointer(path, f"a names file at {path}", ModelError)
+    return read_text(path, "a names file", ModelError)

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import yaml
-
 from standoff.files.json_text import plain
+from standoff.files.yaml_text import dump_yaml
 from standoff.labels import LabelledData, Split
 from standoff.labels.read import CUT_GROUP
 from standoff.labels.summary import SplitSummary, summarise
@@ -54,7 +53,7 @@ How the detector does on sites, seasons, machines and cameras that the data does
 ## To repeat the run
 
 ```yaml
-{yaml.safe_dump(plain(configuration), sort_keys=False)}```
+{dump_yaml(plain(configuration))}```
 """
 
 

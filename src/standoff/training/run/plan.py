@@ -7,11 +7,10 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
-import yaml
-
 from standoff.config import read_params, read_settings_file
 from standoff.core.errors import ConfigError
 from standoff.files.json_text import plain
+from standoff.files.yaml_text import parse_yaml
 from standoff.labels.documents import resolve_path
 from standoff.stages.detect import SHIPPED_MODELS, find_model
 from standoff.training.run.params import TrainParams
@@ -80,12 +79,7 @@ class Overrides:
             for one in outer:
                 section[one] = as_section(section.get(one), one)
                 section = section[one]
-            try:
-                section[last] = yaml.safe_load(text)
-            except yaml.YAMLError as error:
-                raise ConfigError(
-                    expected="a value as YAML has it after --set NAME=", found=f"'{setting}'", fix="check its brackets"
-                ) from error
+            section[last] = parse_yaml(text, "a value as YAML has it after --set NAME=", f"'{setting}'", ConfigError)
 
 
 def read_plan(path: Path) -> dict[str, Any]:

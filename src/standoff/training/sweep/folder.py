@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import Any
 
 from standoff import __version__
 from standoff.core.errors import ConfigError
-from standoff.files.json_text import write_json
+from standoff.files import json_text
 from standoff.files.whole import whole_file
 from standoff.files.yaml_text import write_yaml
 from standoff.labels.documents import read_json
@@ -61,7 +60,7 @@ class SweepFolder:
                 draw_sweep(results, path)
         # The last, and only after the others could be written: to go on, this is what counts.
         with whole_file(self.record) as path:
-            write_json(path, {"standoff": __version__, "scenarios": [result.to_dict() for result in results]})
+            json_text.write_json(path, {"standoff": __version__, "scenarios": [result.to_dict() for result in results]})
 
     def read_results(self, sweep: Sweep) -> dict[str, Result]:
         """Read how scenarios went so far, by name; absent are those that did not begin.
@@ -81,7 +80,7 @@ class SweepFolder:
     def read_history(self, name: str) -> list[dict[str, Any]]:
         """Read the validations of a scenario's run, none before its first."""
         path = self.path / name / "history.json"
-        rows: list[dict[str, Any]] = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else []
+        rows: list[dict[str, Any]] = json_text.read_json(path, "a run's validations") if path.is_file() else []
         return rows
 
     def require_same(self, sweep: Sweep) -> None:
