@@ -152,7 +152,7 @@ def test_labels_in_another_encoding_are_named(tmp_path: Path) -> None:
     save_constant(tmp_path / "m.onnx", {"output0": even_rows(7, 84)}, (64, 64))
     describe(tmp_path / "m.onnx", "family: yolov3\nclasses: labels.txt")
     (tmp_path / "labels.txt").write_bytes("person\nträger".encode("cp1252"))
-    with pytest.raises(ModelError, match=r"labels\.txt, .* with byte 0xE4 in line 2, which is 'ä' in Windows-1252"):
+    with pytest.raises(ModelError, match=r"labels\.txt, found Windows-1252"):
         OnnxDetector(tmp_path / "m.onnx")
 
 
