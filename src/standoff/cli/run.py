@@ -164,7 +164,7 @@ def run(
 ) -> None:
     """Monitor a video: distances in metres, hazards, an annotated film and a report."""
     from standoff.config import load_settings
-    from standoff.monitor import RECORD, open_run, stage_warnings
+    from standoff.monitor import RECORD, open_run
 
     plain = {
         "telemetry": telemetry,
@@ -180,9 +180,8 @@ def run(
     if ground_overrides := _ground_overrides(ground, reference_box, camera):
         overrides["ground"] = ground_overrides
     opened = open_run(source, out, load_settings(config, overrides), overwrite=overwrite)
-    stages = opened.pipeline.motion, opened.pipeline.ground
-    known = stage_warnings(*stages)
-    for warning in (*opened.source.warnings, *known):
+    known = opened.warnings
+    for warning in known:
         typer.echo(f"standoff: warning: {warning}", err=True)
     try:
         watch(opened, quiet=quiet)
@@ -190,7 +189,7 @@ def run(
         # Its own line says it all; only a machine still wants the record.
         tell(out / RECORD, as_json=as_json, quiet=True)
         raise
-    for warning in stage_warnings(*stages):
+    for warning in opened.warnings:
         if warning not in known:
             typer.echo(f"standoff: warning: {warning}", err=True)
     tell(out / RECORD, as_json=as_json, quiet=quiet)
