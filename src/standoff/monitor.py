@@ -60,6 +60,11 @@ class Run:
         """What `run.json` says, or should say where it could not be written."""
         return self.record_sink.record
 
+    @property
+    def warnings(self) -> list[str]:
+        """What is odd about the source, the set-up and what was seen so far, a clause each."""
+        return _warnings(self.source, self.pipeline)
+
     def __iter__(self) -> Generator[FrameResult, None, None]:
         """Yield each frame's result once it is written."""
         try:
@@ -105,7 +110,7 @@ def open_run(source: Path | str, out: Path | str, settings: Settings, *, overwri
     }
 
     def at_close() -> dict[str, Any]:
-        """Return what is known of the ground and the film, now that the frames have been seen."""
+        """Return what is known of the film and the ground, now that the frames have been seen."""
         return _known_so_far(frames, pipeline)
 
     extra = {name: build_replacement(name, replacement) for name, replacement in settings.extra_outputs.items()}
@@ -121,14 +126,14 @@ def open_run(source: Path | str, out: Path | str, settings: Settings, *, overwri
 
 def _known_so_far(source: Source, pipeline: Pipeline) -> dict[str, Any]:
     return {
+        "source": source.description,
         "ground": getattr(pipeline.ground, "description", None),
-        "warnings": [*source.warnings, *pipeline_warnings(pipeline)],
+        "warnings": _warnings(source, pipeline),
     }
 
 
-def pipeline_warnings(pipeline: Pipeline) -> list[str]:
-    """Return what a pipeline's stages say of their own set-up, and of what they have seen so far."""
-    return stage_warnings(pipeline.detector, pipeline.motion, pipeline.ground, pipeline.hazard)
+def _warnings(source: Source, pipeline: Pipeline) -> list[str]:
+    return [*source.warnings, *stage_warnings(pipeline.detector, pipeline.motion, pipeline.ground, pipeline.hazard)]
 
 
 def stage_warnings(*stages: object) -> list[str]:

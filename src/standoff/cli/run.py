@@ -163,7 +163,7 @@ def run(
 ) -> None:
     """Monitor a video: distances in metres, hazards, an annotated film and a report."""
     from standoff.config import load_settings
-    from standoff.monitor import open_run, pipeline_warnings
+    from standoff.monitor import open_run
 
     plain = {
         "telemetry": telemetry,
@@ -179,8 +179,8 @@ def run(
     if ground_overrides := _ground_overrides(ground, reference_box, camera):
         overrides["ground"] = ground_overrides
     opened = open_run(source, out, load_settings(config, overrides), overwrite=overwrite)
-    known = pipeline_warnings(opened.pipeline)
-    for warning in (*opened.source.warnings, *known):
+    known = opened.warnings
+    for warning in known:
         typer.echo(f"standoff: warning: {warning}", err=True)
     try:
         watch(opened, quiet=quiet)
@@ -188,7 +188,7 @@ def run(
         # Its own line says it all; only a machine still wants the record.
         tell(opened, as_json=as_json, quiet=True)
         raise
-    for warning in pipeline_warnings(opened.pipeline):
+    for warning in opened.warnings:
         if warning not in known:
             typer.echo(f"standoff: warning: {warning}", err=True)
     tell(opened, as_json=as_json, quiet=quiet)

@@ -41,13 +41,18 @@ def index_in(picture: ImageArray) -> int:
 
 @dataclass(frozen=True)
 class Recipe:
-    """How to encode: 10 frames a second unless `times_ms` says otherwise."""
+    """How to encode: 10 frames a second unless `times_ms` says otherwise.
+
+    `display` is (a, b, c, d) of a display matrix: a stored (p, q) is shown at (a p + c q, b p + d q).
+    """
 
     codec: str = "libx264"
     pixel_format: str = "yuv420p"
     size_px: tuple[int, int] = (96, 64)
     times_ms: Sequence[int] | None = None
     rotation_deg: int = 0
+    display: tuple[int, int, int, int] | None = None
+    pixel_aspect: Fraction | None = None
     color_range: int = 0
     options: Mapping[str, str] = field(default_factory=lambda: {"g": "12", "bf": "2"})
     muxer_options: Mapping[str, str] = field(default_factory=dict)
@@ -67,9 +72,14 @@ def write_video(path: Path, count: int, recipe: Recipe | None = None, *, picture
         if recipe.times_ms is not None:
             stream.codec_context.time_base = Fraction(1, 1000)
         stream.codec_context.color_range = recipe.color_range
+        if recipe.pixel_aspect is not None:
+            stream.codec_context.sample_aspect_ratio = recipe.pixel_aspect
         reformatter = VideoReformatter()
         if recipe.rotation_deg:
             stream.set_display_rotation(recipe.rotation_deg)
+        if recipe.display is not None:
+            a, b, c, d = recipe.display
+            stream.set_display_matrix([a << 16, b << 16, 0, c << 16, d << 16, 0, 0, 0, 1 << 30])
         for i in range(count):
             coded = coded_picture(recipe.first_index + i, width_px, height_px, seed=recipe.seed)
             frame = reformatter.reformat(

@@ -1,11 +1,11 @@
 from __future__ import annotations
 
-import struct
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
+from PIL import ExifTags, Image, ImageOps
 from stages.frames.coded_video import coded_picture, index_in
 from tolerances import RESIZED_LEVELS
 
@@ -18,6 +18,16 @@ def fill(folder: Path, count: int, suffix: str = ".png") -> Path:
     for index in range(count):
         cv2.imwrite(str(folder / f"shot{index}{suffix}"), coded_picture(index))
     return folder
+
+
+def write_turned(path: Path, orientation: int | None) -> Path:
+    """Write a smooth picture and what its EXIF data say of how it lies."""
+    exif = Image.Exif()
+    if orientation is not None:
+        exif[ExifTags.Base.Orientation] = orientation
+    smooth = cv2.GaussianBlur(coded_picture(1, 130, 82), (0, 0), 5)
+    Image.fromarray(smooth[:, :, ::-1]).save(path, exif=exif)
+    return path
 
 
 @pytest.mark.parametrize("suffix", [".png", ".jpg", ".JPEG", ".bmp", ".tif", ".webp"])
@@ -58,18 +68,29 @@ def test_a_name_with_a_percent_sign_is_no_pattern(tmp_path: Path) -> None:
     assert sorted(index_in(frame.image) for frame in open_source(folder, fps=1)) == [0, 1]
 
 
-@pytest.mark.parametrize("orientation", [1, 3, 6, 8])
+@pytest.mark.parametrize("orientation", range(1, 9))
 def test_orientation_in_exif_data_is_followed_as_opencv_follows_it(tmp_path: Path, orientation: int) -> None:
-    entry = struct.pack("<HHII", 0x0112, 3, 1, orientation)
-    exif = b"Exif\0\0II*\0" + struct.pack("<IH", 8, 1) + entry + struct.pack("<I", 0)
-    plain = cv2.imencode(".jpg", cv2.GaussianBlur(coded_picture(1, 130, 82), (0, 0), 5))[1].tobytes()
-    path = tmp_path / "turned.jpg"
-    path.write_bytes(plain[:2] + b"\xff\xe1" + struct.pack(">H", len(exif) + 2) + exif + plain[2:])
+    path = write_turned(tmp_path / "turned.jpg", orientation)
     (frame,) = open_source(tmp_path, fps=1)
     expected = cv2.imread(str(path))
     assert expected is not None
     assert frame.image.shape == expected.shape
     assert np.abs(frame.image.astype(int) - expected).mean() <= RESIZED_LEVELS
+
+
+@pytest.mark.parametrize("suffix", [".png", ".webp", ".tif", ".jpg"])
+@pytest.mark.parametrize("orientation", [None, 1, 2, 3, 4, 5, 6, 7, 8, 9])
+def test_in_every_format_orientation_is_followed_as_pillow_follows_it(
+    tmp_path: Path, suffix: str, orientation: int | None
+) -> None:
+    path = write_turned(tmp_path / f"turned{suffix}", orientation)
+    with Image.open(path) as stored:
+        expected = np.asarray(ImageOps.exif_transpose(stored).convert("RGB"))[:, :, ::-1].astype(int)
+    (frame,) = open_source(tmp_path, fps=1)
+    (alone,) = open_source(path)
+    for image in (frame.image, alone.image):
+        assert image.shape == expected.shape
+        assert np.abs(image - expected).mean() <= RESIZED_LEVELS
 
 
 @pytest.mark.live
@@ -114,20 +135,35 @@ def test_an_empty_folder_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("suffix", [".png", ".jpg", ".bmp", ".tif", ".webp"])
 @pytest.mark.parametrize("damage", ["cut", "text", "empty"])
-def test_a_corrupt_picture_is_named(tmp_path: Path, suffix: str, damage: str) -> None:
+def test_a_corrupt_picture_is_named_before_anything_is_read(tmp_path: Path, suffix: str, damage: str) -> None:
     folder = fill(tmp_path / "site", 3, suffix)
     path = folder / f"shot1{suffix}"
     content = path.read_bytes()
     path.write_bytes({"cut": content[: len(content) // 2], "text": b"not a picture\n" * 20, "empty": b""}[damage])
-    with open_source(folder, fps=1) as source, pytest.raises(SourceError, match=f"found shot1{suffix}: "):
-        list(source)
+    with pytest.raises(SourceError, match=f"found shot1{suffix}: "):
+        open_source(folder, fps=1)
 
 
-def test_a_picture_of_another_size_is_named(tmp_path: Path) -> None:
-    folder = fill(tmp_path / "site", 3)
-    cv2.imwrite(str(folder / "shot2.png"), coded_picture(2, 120, 80))
-    with open_source(folder, fps=1) as source, pytest.raises(FrameSizeChanged, match=r"120x80 at shot2\.png"):
-        list(source)
+def test_all_pictures_of_another_size_are_named_before_anything_is_read(tmp_path: Path) -> None:
+    folder = fill(tmp_path / "site", 8)
+    for index in (2, 3, 5, 6, 7):
+        cv2.imwrite(str(folder / f"shot{index}.png"), coded_picture(index, 120, 80))
+    found = r"120x80 at shot2\.png, 120x80 at shot3\.png, 120x80 at shot5\.png and 2 more"
+    with pytest.raises(FrameSizeChanged, match=found):
+        open_source(folder, fps=1)
+
+
+def test_a_bad_picture_outside_the_part_that_is_wanted_does_no_harm(tmp_path: Path) -> None:
+    folder = fill(tmp_path / "site", 8)
+    (folder / "shot5.png").write_bytes(b"")
+    with open_source(folder, fps=1, stop_s=5) as source:
+        assert [frame.index for frame in source] == [0, 1, 2, 3, 4]
+    with open_source(folder, fps=1, start_s=6) as source:
+        assert [frame.index for frame in source] == [6, 7]
+    with open_source(folder, fps=1, every=2) as source:
+        assert [frame.index for frame in source] == [0, 2, 4, 6]
+    with pytest.raises(SourceError, match=r"shot5\.png: it is empty"):
+        open_source(folder, fps=1, start_s=4)
 
 
 def test_a_start_beyond_the_last_picture_is_refused(tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from fractions import Fraction
 from pathlib import Path
 
 import av
@@ -15,6 +16,7 @@ from tolerances import GRAY_LEVELS, RESIZED_LEVELS, SWSCALE_LEVELS
 
 from standoff.core.types import ImageArray, Picture
 from standoff.stages.frames import ArrayPicture, AvPicture, Scaler, frame_from_array, open_source
+from standoff.stages.frames.orientation import Orientation
 from standoff.stages.frames.pictures import halved
 
 FORMATS = ["yuv420p", "yuvj420p", "yuv422p", "yuv444p", "nv12", "gray", "rgb24", "bgr24", "yuv420p10le", "rgba"]
@@ -38,11 +40,9 @@ def decoded(image: ImageArray, pixel_format: str, color_range: int = 0) -> av.Vi
 
 @pytest.mark.parametrize("pixel_format", FORMATS)
 @pytest.mark.parametrize("size", [(96, 64), (97, 65), (130, 82)])
-@pytest.mark.parametrize("rotation_deg", [0, 90, -90, 180])
-def test_resizing_to_the_own_size_is_the_picture_itself(
-    pixel_format: str, size: tuple[int, int], rotation_deg: int
-) -> None:
-    picture = AvPicture(decoded(smooth(*size), pixel_format), rotation_deg)
+@pytest.mark.parametrize("exif", [1, 2, 5, 6, 7, 8])
+def test_resizing_to_the_own_size_is_the_picture_itself(pixel_format: str, size: tuple[int, int], exif: int) -> None:
+    picture = AvPicture(decoded(smooth(*size), pixel_format), Orientation.of_exif(exif))
     assert picture.bgr().shape == (picture.height_px, picture.width_px, 3)
     assert np.array_equal(picture.resized_bgr(picture.width_px, picture.height_px), picture.bgr())
 
@@ -54,20 +54,18 @@ def test_resizing_to_the_own_size_is_the_picture_itself(
 )
 @pytest.mark.parametrize("size", [(96, 64), (97, 65)])
 def test_gray_is_close_to_opencvs_gray_and_upright(pixel_format: str, size: tuple[int, int], color_range: int) -> None:
-    for rotation_deg in (0, 90, 180):
-        picture = AvPicture(decoded(smooth(*size, seed=rotation_deg), pixel_format, color_range), rotation_deg)
+    for exif in (1, 3, 5, 8):
+        picture = AvPicture(decoded(smooth(*size, seed=exif), pixel_format, color_range), Orientation.of_exif(exif))
         expected = cv2.cvtColor(picture.bgr(), cv2.COLOR_BGR2GRAY).astype(int)
         assert picture.gray().shape == expected.shape
         assert np.abs(picture.gray() - expected).max() <= GRAY_LEVELS
 
 
 @pytest.mark.parametrize("pixel_format", ["yuv420p", "yuvj420p", "gray", "bgr24"])
-@pytest.mark.parametrize("rotation_deg", [0, 90, 180])
+@pytest.mark.parametrize("exif", [1, 3, 5, 8])
 @pytest.mark.parametrize("color_range", [LIMITED, FULL])
-def test_parts_of_the_luma_are_parts_of_the_gray_picture(
-    pixel_format: str, rotation_deg: int, color_range: int
-) -> None:
-    picture = AvPicture(decoded(smooth(97, 65), pixel_format, color_range), rotation_deg)
+def test_parts_of_the_luma_are_parts_of_the_gray_picture(pixel_format: str, exif: int, color_range: int) -> None:
+    picture = AvPicture(decoded(smooth(97, 65), pixel_format, color_range), Orientation.of_exif(exif))
     luma = picture.luma()
     part = luma[3:40, 5:50]
     assert luma.shape == picture.gray().shape
@@ -75,10 +73,10 @@ def test_parts_of_the_luma_are_parts_of_the_gray_picture(
 
 
 @pytest.mark.parametrize("pixel_format", ["yuv420p", "yuvj420p", "gray", "bgr24"])
-@pytest.mark.parametrize("rotation_deg", [0, 90, 180])
+@pytest.mark.parametrize("exif", [1, 3, 5, 8])
 @pytest.mark.parametrize("times", [0, 1, 2])
-def test_halved_gray_is_gray_halved(pixel_format: str, rotation_deg: int, times: int) -> None:
-    picture = AvPicture(decoded(smooth(98, 67), pixel_format), rotation_deg)
+def test_halved_gray_is_gray_halved(pixel_format: str, exif: int, times: int) -> None:
+    picture = AvPicture(decoded(smooth(98, 67), pixel_format), Orientation.of_exif(exif))
     expected = halved(picture.gray(), times).astype(int)
     width_px, height_px = picture.width_px >> times, picture.height_px >> times
     assert picture.halved_gray(times).shape == expected.shape == (height_px, width_px)
@@ -103,15 +101,15 @@ def test_black_and_white_are_0_and_255_in_either_range(tmp_path: Path, color_ran
 @given(
     width_px=st.integers(16, 82),  # smaller in both directions: OpenCV averages areas only then
     height_px=st.integers(16, 60),
-    rotation_deg=st.sampled_from([0, 90, -90, 180]),
+    exif=st.integers(1, 8),
     pixel_format=st.sampled_from(["yuv420p", "yuv444p", "bgr24", "yuv420p10le"]),
     seed=st.integers(0, 99),
 )
 @examples(60)
 def test_resizing_is_close_to_resizing_the_full_picture(
-    width_px: int, height_px: int, rotation_deg: int, pixel_format: str, seed: int
+    width_px: int, height_px: int, exif: int, pixel_format: str, seed: int
 ) -> None:
-    picture = AvPicture(decoded(smooth(130, 82, seed=seed), pixel_format), rotation_deg)
+    picture = AvPicture(decoded(smooth(130, 82, seed=seed), pixel_format), Orientation.of_exif(exif))
     resized = picture.resized_bgr(width_px, height_px)
     assert resized.shape == (height_px, width_px, 3)
     expected = cv2.resize(picture.bgr(), (width_px, height_px), interpolation=cv2.INTER_AREA)
@@ -177,6 +175,21 @@ def test_arrays_of_another_kind_are_refused(image: ImageArray) -> None:
         frame_from_array(image)
 
 
-def test_a_crooked_rotation_is_refused() -> None:
-    with pytest.raises(ValueError, match="rotation_deg"):
-        AvPicture(decoded(smooth(96, 64), "yuv420p"), 45)
+@pytest.mark.parametrize("pixel_format", ["yuv420p", "bgr24"])
+@pytest.mark.parametrize("exif", [1, 5, 6])
+@pytest.mark.parametrize(("aspect", "wide_px"), [(Fraction(4, 3), 128), (Fraction(8, 9), 85), (Fraction(1), 96)])
+def test_pixels_that_are_not_square_are_stretched_sideways_as_opencv_stretches_them(
+    pixel_format: str, exif: int, aspect: Fraction, wide_px: int
+) -> None:
+    frame, orientation = decoded(smooth(96, 64), pixel_format), Orientation.of_exif(exif)
+    picture = AvPicture(frame, orientation, pixel_aspect=aspect)
+    assert (picture.width_px, picture.height_px) == orientation.size_px((wide_px, 64))
+    stored = AvPicture(frame).bgr()
+    expected = orientation.upright(cv2.resize(stored, (wide_px, 64), interpolation=cv2.INTER_AREA))
+    assert np.abs(picture.bgr().astype(int) - expected).mean() <= RESIZED_LEVELS
+    gray = cv2.cvtColor(expected, cv2.COLOR_BGR2GRAY).astype(int)
+    for found in (picture.gray(), picture.luma()[:, :], picture.halved_gray(0)):
+        assert np.abs(found - gray).mean() <= RESIZED_LEVELS
+    half = picture.resized_bgr(picture.width_px // 2, picture.height_px // 2)
+    shrunk = cv2.resize(expected, half.shape[1::-1], interpolation=cv2.INTER_AREA)
+    assert np.abs(half.astype(int) - shrunk).mean() <= RESIZED_LEVELS

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import av
 from av.stream import Disposition
@@ -18,12 +19,16 @@ if TYPE_CHECKING:
     from av.container import InputContainer
     from av.video.stream import VideoStream
 
+_AVI = "avi"
 _TEXT_ART_CODECS = frozenset({"ansi", "bintext", "idf", "xbin"})  # how libav "decodes" a text file
+_NO_FILM = Disposition.attached_pic | Disposition.timed_thumbnails
 _FRAMES_FORGIVEN = 2  # headers of sound files are off by this much
 
 
 def open_video(path: Path) -> tuple[InputContainer, VideoStream]:
-    """Return the container and its video stream, ready to decode on all cores.
+    """Return the container and the stream of its film, ready to decode on all cores.
+
+    Thumbnails and attached pictures are no films; of several films it is the main one.
 
     Raises:
         SourceError: It is no video file.
@@ -47,17 +52,56 @@ def open_video(path: Path) -> tuple[InputContainer, VideoStream]:
                 fix="copy it again, or repair it from another recording of the same camera",
             ) from error
         raise not_a_video(path, "which no reader recognises") from error
-    streams = [stream for stream in container.streams.video if not stream.disposition & Disposition.attached_pic]
-    if not streams:
+    films = [stream for stream in container.streams.video if not stream.disposition & _NO_FILM]
+    if not films:
         kinds = ", ".join(sorted({stream.type for stream in container.streams})) or "nothing"
         container.close()
         raise not_a_video(path, f"which holds {kinds} and no video")
-    stream = streams[0]
+    stream = _main(films)
     if stream.codec_context is None or stream.codec_context.name in _TEXT_ART_CODECS:
         container.close()
         raise not_a_video(path, "which holds text" if stream.codec_context else "whose codec is unknown")
     stream.thread_type = "AUTO"
     return container, stream
+
+
+def _main(films: Sequence[VideoStream]) -> VideoStream:
+    """Return the film itself, of which a camera may have put a preview into the same file.
+
+    As ffmpeg chooses: one that is marked as the default, else any; of those the one with the most pixels; of those
+    the first.
+    """
+    decodable = [film for film in films if film.codec_context is not None] or films
+    marked = [film for film in decodable if film.disposition & Disposition.default]
+    return max(marked or decodable, key=_pixels)
+
+
+def _pixels(film: VideoStream) -> int:
+    return 0 if film.codec_context is None else film.codec_context.width * film.codec_context.height
+
+
+def passed_over(container: InputContainer, chosen: VideoStream) -> str:
+    """Name the films of a file that are not read; empty where there is no other."""
+    others = [
+        film for film in container.streams.video if film.index != chosen.index and not film.disposition & _NO_FILM
+    ]
+    sizes = [(film, film.codec_context) for film in others]
+    return ", ".join(
+        f"{film.index}" + (f" ({codec.width}x{codec.height})" if codec is not None else "") for film, codec in sizes
+    )
+
+
+def describe_streams(container: InputContainer) -> list[dict[str, Any]]:
+    """Return what kinds of pictures a file holds, for the record."""
+    return [
+        {
+            "index": film.index,
+            "codec": None if film.codec_context is None else film.codec_context.name,
+            "size_px": None if film.codec_context is None else [film.codec_context.width, film.codec_context.height],
+            "disposition": [mark.name for mark in Disposition if film.disposition & mark],
+        }
+        for film in container.streams.video
+    ]
 
 
 def _begins_like_mp4(path: Path) -> bool:
@@ -83,6 +127,7 @@ class Header:
         declared_frames: Number of pictures; 0 when it does not tell.
         duration_s: Of the video; None when the file speaks only of all streams together, or not at all.
         rate_fps: Average pictures a second; 0 when unknown.
+        pixel_aspect: Width of a stored pixel in its heights; None: square, or not told.
         created_at: Aware UTC, or None. Some cameras write their local time here, as if it were UTC.
         camera_names: What may be the camera's model; drones write it under several keys.
     """
@@ -93,19 +138,27 @@ class Header:
     declared_frames: int
     duration_s: float | None
     rate_fps: float
+    pixel_aspect: Fraction | None
     created_at: datetime | None
     camera_names: tuple[str, ...]
 
     @classmethod
     def of(cls, container: InputContainer, stream: VideoStream) -> Header:
         """Read it."""
+        duration_s, declared = _duration_s(container, stream), stream.frames
+        rate_fps = float(stream.average_rate or stream.guessed_rate or 0.0)
+        if container.format.name == _AVI and (stored := _indexed_frames(stream)):
+            # It declares ticks, of which those without a picture repeat the one before.
+            declared, rate_fps = stored, stored / duration_s if duration_s else rate_fps
         return cls(
             container=container.format.name,
             codec=stream.codec_context.name,
             time_base_s=Fraction(stream.time_base or 0),
-            declared_frames=stream.frames,
-            duration_s=_duration_s(container, stream),
-            rate_fps=float(stream.average_rate or stream.guessed_rate or 0.0),
+            declared_frames=declared,
+            duration_s=duration_s,
+            rate_fps=rate_fps,
+            # Of the shape of a picture file's pixels no viewer takes notice.
+            pixel_aspect=None if container.format.name.endswith("_pipe") else stream.sample_aspect_ratio,
             created_at=_creation_time(container, stream),
             camera_names=(*container.metadata.values(), *stream.metadata.values()),
         )
@@ -119,12 +172,8 @@ class Header:
 
     @property
     def tells_decoding_times_only(self) -> bool:
-        """AVI has no presentation timestamps; libav makes some up, wrong ones where pictures are reordered.
-
-        The frame's decoding time differs from its presentation time by a constant, and is missing on the
-        last few frames, one tick apart.
-        """
-        return self.container == "avi"
+        """AVI has no presentation timestamps; libav makes some up, wrong ones where pictures are reordered."""
+        return self.container == _AVI
 
     def ends_early(self, frames: int, end_s: float) -> bool:
         """Tell whether a video that ends after this many frames and seconds is shorter than declared.
@@ -137,6 +186,13 @@ class Header:
         few = frames < self.declared_frames - _FRAMES_FORGIVEN
         short = end_s < declared_s - (_FRAMES_FORGIVEN + 0.5) * period_s
         return short and (few or not self.declared_frames)
+
+
+def _indexed_frames(stream: VideoStream) -> int:
+    """Return how many pictures the file's index lists; 0 where it has none, or not to the end."""
+    listed = list(stream.index_entries)
+    is_whole = bool(listed) and listed[-1].timestamp + 1 + _FRAMES_FORGIVEN >= stream.frames
+    return sum(entry.size > 0 for entry in listed) if is_whole else 0
 
 
 def _duration_s(container: InputContainer, stream: VideoStream) -> float | None:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import io
-import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -16,27 +15,21 @@ from standoff.core.errors import SourceError
 from standoff.files.lfs import refuse_pointer
 from standoff.stages.frames.album import read_album
 from standoff.stages.frames.fingerprint import fingerprint
+from standoff.stages.frames.orientation import UPRIGHT, Orientation
 from standoff.stages.frames.photograph import read_photograph
+from standoff.stages.frames.picture_header import PictureHeader, UnreadablePicture, read_header
 from standoff.stages.frames.pictures import AvPicture, Scaler
-from standoff.stages.frames.reader import TIME_ROUNDING_S, Shot, check_size
+from standoff.stages.frames.reader import Selection, Shot, check_size, size_changed
 
 _IMAGE_SUFFIXES = frozenset({".bmp", ".jpeg", ".jpg", ".png", ".tif", ".tiff", ".webp"})
 _LEFT_BY_FILE_MANAGERS = frozenset({"thumbs.db", "desktop.ini"})
-_STRANGERS_NAMED = 3
-_JPEG_START, _JPEG_SCAN, _JPEG_END = b"\xff\xd8", b"\xff\xda", b"\xff\xd9"
+_NAMED = 3
+_REPLACE = "replace it, or take it out of the folder"
 
 
 def _natural_key(path: Path) -> tuple[list[tuple[int, str]], str]:
     parts = re.findall(r"\d+|\D+", path.name)
     return [(int(part), "") if part.isdecimal() else (-1, part.casefold()) for part in parts], path.name
-
-
-def _is_whole_jpeg(content: bytes) -> bool:
-    """Tell whether the picture's end marker follows its data; decoders fill up what is missing without a word."""
-    position = len(_JPEG_START)
-    while content[position : position + 1] == b"\xff" and content[position : position + 2] != _JPEG_SCAN:
-        position += 2 + int.from_bytes(content[position + 2 : position + 4], "big")
-    return content.find(_JPEG_END, position) >= 0
 
 
 def _list_images(folder: Path) -> list[Path]:
@@ -48,11 +41,9 @@ def _list_images(folder: Path) -> list[Path]:
     images = [path for path in present if path.suffix.casefold() in _IMAGE_SUFFIXES and path.is_file()]
     strangers = sorted(set(present) - set(images))
     if strangers:
-        names = ", ".join(path.name for path in strangers[:_STRANGERS_NAMED])
-        more = f" and {len(strangers) - _STRANGERS_NAMED} more" if len(strangers) > _STRANGERS_NAMED else ""
         raise SourceError(
             expected=f"only images ({', '.join(sorted(_IMAGE_SUFFIXES))}) in {folder.name}",
-            found=f"{names}{more}",
+            found=_some([path.name for path in strangers]),
             fix="move what is not part of the sequence elsewhere",
         )
     if not images:
@@ -60,14 +51,17 @@ def _list_images(folder: Path) -> list[Path]:
     return sorted(images, key=_natural_key)
 
 
-def _decode(path: Path, scaler: Scaler) -> AvPicture:
+def _some(texts: Sequence[str]) -> str:
+    """Name the first few, and count the others."""
+    more = f" and {len(texts) - _NAMED} more" if len(texts) > _NAMED else ""
+    return ", ".join(texts[:_NAMED]) + more
+
+
+def _decode(path: Path, orientation: Orientation, scaler: Scaler) -> AvPicture:
     """Decode one image by its content, whatever its name promises."""
     try:
-        content = path.read_bytes()
-        if content.startswith(_JPEG_START) and not _is_whole_jpeg(content):
-            raise ValueError("its end is missing")
         # From memory: a file name with % in it would be taken for a pattern.
-        with av.open(io.BytesIO(content)) as container:
+        with av.open(io.BytesIO(path.read_bytes())) as container:
             frame = next(container.decode(video=0), None)
         if frame is None:
             raise ValueError("it holds no picture")
@@ -76,15 +70,43 @@ def _decode(path: Path, scaler: Scaler) -> AvPicture:
         raise SourceError(
             expected="an image that can be decoded",
             found=f"{path.name}: {error}",
-            fix="replace it, or take it out of the folder",
+            fix=_REPLACE,
         ) from error
-    return AvPicture(frame, round(frame.rotation), scaler)
+    return AvPicture(frame, orientation, scaler)
+
+
+def _checked_headers(paths: Sequence[Path]) -> list[PictureHeader]:
+    """Return what all images say of themselves.
+
+    Raises:
+        SourceError: Some are no whole images.
+        FrameSizeChanged: Some have another size than the first.
+    """
+    headers: list[PictureHeader] = []
+    unreadable: list[str] = []
+    for path in paths:
+        try:
+            headers.append(read_header(path))
+        except (UnreadablePicture, FileNotFoundError) as error:
+            unreadable.append(f"{path.name}: {error}")
+    if unreadable:
+        raise SourceError(expected="images that can be decoded", found=_some(unreadable), fix=_REPLACE)
+    size_px = headers[0].size_px
+    strange = [
+        "{}x{} at {}".format(*header.size_px, path.name)
+        for path, header in zip(paths, headers, strict=True)
+        if header.size_px != size_px
+    ]
+    if strange:
+        raise size_changed(size_px, _some(strange))
+    return headers
 
 
 class FolderReader:
-    """Read the images of a folder in natural order (2 before 10), turned upright as their EXIF data say.
+    """Read the images of a folder in natural order (2 before 10), upright as their EXIF data say.
 
-    Mirroring in EXIF data, which no camera writes, is not undone. Hidden files are overlooked.
+    All eight orientations of EXIF data are followed, those that mirror as well; what a header says of the shape of
+    pixels is not, as no viewer does. Hidden files are overlooked.
 
     Args:
         folder: It holds images only.
@@ -92,11 +114,11 @@ class FolderReader:
 
     Raises:
         SourceError: No frame rate is given, something else lies in the folder, it is empty, or its first
-            image cannot be decoded.
+            image cannot be read.
     """
 
     started_at: datetime | None = None
-    rotation_deg = 0
+    orientation = UPRIGHT
 
     def __init__(self, folder: Path, fps: float | None) -> None:
         if fps is None:
@@ -108,21 +130,31 @@ class FolderReader:
         self._folder = folder
         self._scaler = Scaler()
         self._paths = _list_images(folder)
-        first = _decode(self._paths[0], self._scaler)
-        self.size_px = (first.width_px, first.height_px)
+        self.size_px = _checked_headers(self._paths[:1])[0].size_px
         self.total_frames: int | None = len(self._paths)
         self.rate_fps = fps
+        self._fingerprint = fingerprint(self._paths)
         album = read_album(self._paths)
         self.drone = album.drone
         self.camera_prior = album.camera_prior(self.size_px)
         self.warnings = album.warnings
 
-    def shots(self, start_s: float, every: int) -> Iterator[Shot]:
-        """Yield every `every`-th image from `start_s` on; the others are not even opened."""
-        first = max(0, math.ceil((start_s - TIME_ROUNDING_S) * self.rate_fps))
-        for index in range(first, len(self._paths), every):
-            path = self._paths[index]
-            picture = _decode(path, self._scaler)
+    def shots(self, wanted: Selection) -> Iterator[Shot]:
+        """Yield the images that are wanted; the others are not even opened.
+
+        The headers of all of them are read first: what is wrong with the last one is said before any work is done.
+
+        Raises:
+            SourceError: Images that cannot be read, or have another size than the first.
+        """
+        chosen = self._paths[: wanted.end_index(len(self._paths), self.rate_fps)]
+        numbered = list(enumerate(chosen))[wanted.first_index(self.rate_fps) :: wanted.every]
+        headers = _checked_headers([self._paths[0], *(path for _, path in numbered)])[1:]
+        return self._decoded(numbered, headers)
+
+    def _decoded(self, numbered: Sequence[tuple[int, Path]], headers: Sequence[PictureHeader]) -> Iterator[Shot]:
+        for (index, path), header in zip(numbered, headers, strict=True):
+            picture = _decode(path, header.orientation, self._scaler)
             check_size(picture, self.size_px, path.name)
             time_s = index / self.rate_fps
             yield Shot(index, time_s, picture, path.name, read_photograph(path, time_s).telemetry)
@@ -136,7 +168,7 @@ class FolderReader:
             "size_px": list(self.size_px),
             "fps": self.rate_fps,
             "duration_s": len(self._paths) / self.rate_fps,
-            "fingerprint": fingerprint(self._paths),
+            "fingerprint": self._fingerprint,
             "frames_declared": len(self._paths),
             "clock": "given frame rate",
         }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
 from threading import Lock
 
 import av
@@ -11,6 +12,8 @@ import numpy as np
 from av.video.reformatter import VideoReformatter
 
 from standoff.core.types import ImageArray, Luma
+from standoff.stages.frames.orientation import UPRIGHT, Orientation
+from standoff.stages.frames.pixel_shape import square_size_px
 
 _EIGHT_BIT_LUMA_FIRST = frozenset(
     ["gray", "nv12", "nv21", "nv16"]
@@ -20,14 +23,6 @@ _EIGHT_BIT_420 = frozenset(["yuv420p", "yuvj420p", "nv12"])
 _FULL_RANGE = 2  # AVCOL_RANGE_JPEG
 _LIMITED_TO_FULL = np.clip(np.rint((np.arange(256) - 16) * (255 / 219)), 0, 255).astype(np.uint8)
 _LIMITED_TO_FULL.setflags(write=False)
-
-# rotation_deg is counter-clockwise, as PyAV tells it; -180 and 180 are the same.
-_TURNS = {
-    90: cv2.ROTATE_90_COUNTERCLOCKWISE,
-    -90: cv2.ROTATE_90_CLOCKWISE,
-    180: cv2.ROTATE_180,
-    -180: cv2.ROTATE_180,
-}
 
 
 def _read_only(image: ImageArray) -> ImageArray:
@@ -87,49 +82,46 @@ class Scaler:
 
 
 class AvPicture:
-    """A decoded video frame, upright; valid for as long as it is kept, whatever the decoder does next.
+    """A decoded video frame, upright and with square pixels; valid for as long as it is kept, whatever comes next.
 
     Args:
         frame: The decoded `av.VideoFrame`, never changed.
-        rotation_deg: Counter-clockwise turn that makes it upright: 0, 90, -90, 180 or -180.
+        orientation: What makes it upright.
         scaler: Shared by all pictures of a stream, to be quick.
+        pixel_aspect: Width of a stored pixel in its heights; None: square.
     """
 
-    __slots__ = ("_bgr", "_frame", "_gray", "_rotation_deg", "_scaler")
+    __slots__ = ("_bgr", "_frame", "_gray", "_orientation", "_scaler", "_square_px")
 
-    def __init__(self, frame: av.VideoFrame, rotation_deg: int = 0, scaler: Scaler | None = None) -> None:
-        if rotation_deg and rotation_deg not in _TURNS:
-            raise ValueError(f"rotation_deg must be 0, 90, -90, 180 or -180, not {rotation_deg}")
+    def __init__(
+        self,
+        frame: av.VideoFrame,
+        orientation: Orientation = UPRIGHT,
+        scaler: Scaler | None = None,
+        pixel_aspect: Fraction | None = None,
+    ) -> None:
         self._frame = frame
-        self._rotation_deg = rotation_deg
+        self._orientation = orientation
         self._scaler = scaler or Scaler()
+        self._square_px = square_size_px((frame.width, frame.height), pixel_aspect)
         self._bgr: ImageArray | None = None
         self._gray: ImageArray | None = None
-
-    def _lies_on_its_side(self) -> bool:
-        return abs(self._rotation_deg) == 90
-
-    def _upright(self, image: ImageArray) -> ImageArray:
-        if not self._rotation_deg:
-            return image
-        turned: ImageArray = cv2.rotate(image, _TURNS[self._rotation_deg])
-        return turned
 
     @property
     def width_px(self) -> int:
         """Width once upright."""
-        return int(self._frame.height if self._lies_on_its_side() else self._frame.width)
+        return self._orientation.size_px(self._square_px)[0]
 
     @property
     def height_px(self) -> int:
         """Height once upright."""
-        return int(self._frame.width if self._lies_on_its_side() else self._frame.height)
+        return self._orientation.size_px(self._square_px)[1]
 
     def bgr(self) -> ImageArray:
         """Return (H, W, 3) uint8, blue first, read-only; converted once and kept."""
         if self._bgr is None:
-            pixels = self._scaler.bgr(self._frame, self._frame.width, self._frame.height)
-            self._bgr = _read_only(self._upright(pixels))
+            pixels = self._scaler.bgr(self._frame, *self._square_px)
+            self._bgr = _read_only(self._orientation.upright(pixels))
         return self._bgr
 
     def resized_bgr(self, width_px: int, height_px: int) -> ImageArray:
@@ -140,24 +132,26 @@ class AvPicture:
         """
         if (width_px, height_px) == (self.width_px, self.height_px):
             return self.bgr().copy()
-        wide, high = (height_px, width_px) if self._lies_on_its_side() else (width_px, height_px)
-        return self._upright(self._scaler.bgr(self._frame, wide, high))
+        stored_px = self._orientation.size_px((width_px, height_px))
+        return self._orientation.upright(self._scaler.bgr(self._frame, *stored_px))
 
     def gray(self) -> ImageArray:
         """Return (H, W) uint8 luma, 0 black to 255 white, read-only; made once and kept.
 
         Eight-bit YUV: the coded luma itself, stretched from 16..235 where the video says (or does not
         deny) that it uses only those. It follows the video's own colour matrix, so that saturated
-        colours differ a little from OpenCV's gray, which is always BT.601. Other formats: from `bgr()`.
+        colours differ a little from OpenCV's gray, which is always BT.601. Other formats, and pixels that are
+        not square: from `bgr()`.
         """
         if self._gray is None:
             coded = self._coded_luma()
-            self._gray = _read_only(_gray_of(self.bgr()) if coded is None else self._upright(coded[:, :]))
+            gray = _gray_of(self.bgr()) if coded is None else self._orientation.upright(coded[:, :])
+            self._gray = _read_only(gray)
         return self._gray
 
     def luma(self) -> Luma:
         """Return what `gray` shows, of which only the parts that are asked for are made."""
-        coded = self._coded_luma() if self._gray is None and not self._rotation_deg else None
+        coded = self._coded_luma() if self._gray is None and self._orientation.is_upright else None
         return self.gray() if coded is None else coded
 
     def halved_gray(self, times: int) -> ImageArray:
@@ -166,12 +160,14 @@ class AvPicture:
         Averaged before it is stretched, where there is a coded luma: that is a fraction of the work, and rounds
         differently by a level here and there.
         """
-        coded = None if self._rotation_deg else self._coded_luma()
+        coded = self._coded_luma() if self._orientation.is_upright else None
         return halved(self.gray(), times) if coded is None else coded.halved(times)
 
     def _coded_luma(self) -> _CodedLuma | None:
-        """Return the luma plane as it lies in the file; None where there is none."""
+        """Return the luma plane as it lies in the file; None where there is none, or not of the picture's size."""
         frame, plane = self._frame, self._frame.planes[0]
+        if self._square_px != (frame.width, frame.height):
+            return None
         if frame.format.name not in _EIGHT_BIT_LUMA_FIRST or plane.line_size < 0:
             return None
         rows = np.frombuffer(plane, np.uint8)[: plane.line_size * frame.height].reshape(frame.height, plane.line_size)

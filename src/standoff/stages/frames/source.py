@@ -15,65 +15,19 @@ from itertools import chain
 from os import PathLike
 from pathlib import Path
 from types import TracebackType
-from typing import Any, NamedTuple, Self
+from typing import Any, Self
 
 from standoff.core.camera import CameraPrior
 from standoff.core.errors import SourceError
 from standoff.core.types import Frame, ImageArray
 from standoff.stages.frames.folder import FolderReader
 from standoff.stages.frames.pictures import ArrayPicture
-from standoff.stages.frames.reader import TIME_ROUNDING_S, Reader, Shot
+from standoff.stages.frames.reader import TIME_ROUNDING_S, Reader, Selection, Shot
 from standoff.stages.frames.telemetry_choice import TelemetryChoice, choose_telemetry
 from standoff.stages.frames.video import VideoReader
 
 _ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:/")
 """A scheme has two letters or more; a drive has one. A path has lost the second slash."""
-
-
-class Selection(NamedTuple):
-    """Which part of a source is wanted.
-
-    Attributes:
-        start_s: First moment, seconds from the first picture.
-        stop_s: Moment before which it ends; None: the end.
-        every: 1: every picture from the start on, 2: every second one, ...
-    """
-
-    start_s: float = 0.0
-    stop_s: float | None = None
-    every: int = 1
-
-    def expected_of(self, total_frames: int | None, rate_fps: float) -> int | None:
-        """Return how many of a source's pictures are wanted, or None when that cannot be told.
-
-        Exact at a constant rate, an estimate at a variable one.
-
-        >>> Selection(start_s=1.0, stop_s=2.0, every=3).expected_of(100, 10.0)
-        4
-        """
-        if total_frames is None:
-            return None
-        first, last = 0, total_frames
-        if self.start_s > 0 or self.stop_s is not None:
-            if rate_fps <= 0:
-                return None
-            first = max(0, math.ceil((self.start_s - TIME_ROUNDING_S) * rate_fps))
-            if self.stop_s is not None:
-                last = min(last, math.ceil((self.stop_s - TIME_ROUNDING_S) * rate_fps))
-        return math.ceil(max(0, last - first) / self.every)
-
-    def check(self) -> None:
-        """Raise SourceError for a part that no source can have."""
-        if not (math.isfinite(self.start_s) and self.start_s >= 0):
-            raise SourceError(
-                expected="a start of 0 s or later", found=f"{self.start_s} s", fix="give seconds from the first picture"
-            )
-        if self.stop_s is not None and not self.stop_s > self.start_s:
-            raise SourceError(
-                expected=f"a stop after the start ({self.start_s} s)", found=f"{self.stop_s} s", fix="give a later stop"
-            )
-        if self.every < 1:
-            raise SourceError(expected="every 1 or more", found=str(self.every), fix="give 1 for every picture")
 
 
 class Source:
@@ -107,7 +61,7 @@ class Source:
         self._shots = self._wanted_shots()
 
     def _wanted_shots(self) -> Iterator[Shot]:
-        shots = self._reader.shots(self._selection.start_s, self._selection.every)
+        shots = self._reader.shots(self._selection)
         first = next(shots, None)
         stop_s = math.inf if self._selection.stop_s is None else self._selection.stop_s - TIME_ROUNDING_S
         if first is None or first.time_s >= stop_s:
@@ -146,7 +100,7 @@ class Source:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What the source says that does not fit together, or is not used, a clause each; known once it is open."""
+        """What does not fit together, was not used or was lost, a clause each; some are known only at the end."""
         return (*self._reader.warnings, *self._telemetry.warnings)
 
     @property

@@ -89,7 +89,7 @@ def _fitted(log: FlightLog, reader: Reader) -> TelemetryChoice:
     total, rate_fps = reader.total_frames, reader.rate_fps
     duration_s = total / rate_fps if total and rate_fps else None
     warnings = log.disagreements(duration_s, total)
-    if reader.rotation_deg and log.has_attitude:
+    if not reader.orientation.is_upright and log.has_attitude:
         warnings = (*warnings, f"{log.name}: the film is turned; its gimbal angles are not used")
         log = log.without_attitude()
     return TelemetryChoice(log, warnings=warnings)

@@ -1,11 +1,11 @@
-"""Video files through PyAV: presentation timestamps, rotation, an exact start, and an honest end."""
+"""Video files through PyAV: presentation timestamps, upright square pixels, an exact start, and an honest end."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
 from fractions import Fraction
-from itertools import chain
+from itertools import chain, dropwhile
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +13,14 @@ import av
 
 from standoff.core.camera import CameraPrior
 from standoff.core.errors import SourceError, SourceTruncated
-from standoff.stages.frames.container import Header, not_a_video, open_video
+from standoff.stages.frames.container import Header, describe_streams, not_a_video, open_video, passed_over
 from standoff.stages.frames.fingerprint import fingerprint
+from standoff.stages.frames.orientation import Orientation, display_orientation
 from standoff.stages.frames.pictures import AvPicture, Scaler
+from standoff.stages.frames.pixel_shape import square_size_px
 from standoff.stages.frames.prior import drone_prior, find_drone
-from standoff.stages.frames.reader import TIME_ROUNDING_S, Shot, check_size
+from standoff.stages.frames.reader import TIME_ROUNDING_S, Selection, Shot, check_size
+from standoff.stages.frames.times import AviTicks, RisingTimes
 
 _UNDECODABLE_IN_A_ROW = 100
 
@@ -26,7 +29,8 @@ class VideoReader:
     """Read a video file.
 
     Times are presentation timestamps from the first picture on, so variable frame rate is normal. Packets
-    that cannot be decoded are skipped, concealed pictures are kept; both are counted in `corrupt_frames`.
+    that cannot be decoded are skipped, concealed pictures are kept; both are counted in `corrupt_frames`. Pictures
+    are turned and mirrored as the film's display matrix says, and stretched sideways where its pixels are not square.
 
     Args:
         path: The file.
@@ -36,7 +40,8 @@ class VideoReader:
         corrupt_frames: Pictures lost or damaged so far.
 
     Raises:
-        SourceError: It is no video, or not one picture of it can be decoded.
+        SourceError: It is no video, its pixels or its display matrix have a shape that films do not have, or not one
+            picture of it can be decoded.
         SourceTruncated: The table of its frames is missing.
     """
 
@@ -53,11 +58,11 @@ class VideoReader:
         self._frames = self._decoded()
         try:
             self._first = self._first_frame()
-            self.rotation_deg = self._rotation()
+            self.orientation = self._orientation()
+            picture = self._picture(self._first)
         except SourceError:
             self._container.close()
             raise
-        picture = AvPicture(self._first, self.rotation_deg)
         self.size_px = (picture.width_px, picture.height_px)
         self.drone = find_drone(header.camera_names)
         self.camera_prior = (
@@ -65,7 +70,9 @@ class VideoReader:
             if self.drone is None
             else drone_prior(self.size_px, self.drone, film=True)
         )
-        self.warnings: tuple[str, ...] = ()
+        self._times = RisingTimes(path.name)
+        self._layout = self._what_was_chosen()
+        self._about = self._describe()  # now: at the end the file may be gone
 
     def _first_frame(self) -> av.VideoFrame:
         first = next(self._frames, None)
@@ -73,21 +80,31 @@ class VideoReader:
             raise not_a_video(self._path, "not one picture of which can be decoded")
         return first
 
-    def _rotation(self) -> int:
-        rotation_deg: int = round(self._first.rotation)
-        if rotation_deg % 90:
+    def _orientation(self) -> Orientation:
+        try:
+            return display_orientation(self._first)
+        except ValueError as error:
             raise SourceError(
                 expected="a video turned by a multiple of 90 degrees",
-                found=f"{rotation_deg} degrees in {self._path.name}",
+                found=f"{self._path.name}, {error}",
                 fix="convert it with ffmpeg, which turns the pictures",
-            )
-        return rotation_deg
+            ) from error
+
+    def _picture(self, frame: av.VideoFrame) -> AvPicture:
+        try:
+            return AvPicture(frame, self.orientation, self._scaler, self._header.pixel_aspect)
+        except ValueError as error:
+            raise SourceError(
+                expected="pixels that are square, or nearly so",
+                found=f"{error} in {self._path.name}",
+                fix="correct it with ffmpeg (-aspect, or the filter setsar)",
+            ) from error
 
     def _decoded(self) -> Iterator[av.VideoFrame]:
         """Yield the frames from where the container stands; remember why reading stopped, if it failed."""
         self._reading_error = ""
         self.corrupt_frames = failures = 0
-        last_tick = -1
+        avi_ticks = AviTicks()
         try:
             for packet in self._container.demux(self._stream):
                 self._discarded += packet.is_discard
@@ -104,38 +121,36 @@ class VideoReader:
                     failures = 0
                     self.corrupt_frames += frame.is_corrupt
                     if self._header.tells_decoding_times_only:
-                        frame.pts = last_tick = last_tick + 1 if frame.dts is None else frame.dts
+                        frame.pts = avi_ticks.of(frame.dts)
                     yield frame
         except av.FFmpegError as error:
             self._reading_error = str(error)
 
-    def shots(self, start_s: float, every: int) -> Iterator[Shot]:
-        """Yield every `every`-th picture from the first one at or after `start_s`.
+    def shots(self, wanted: Selection) -> Iterator[Shot]:
+        """Yield the pictures that are wanted.
+
+        A picture whose time is not later than the one before, or by microseconds only, is skipped and counted.
 
         Raises:
             FrameSizeChanged: At the first picture of another size.
             SourceTruncated: After the last picture, when the file declares more.
-            SourceError: A timestamp is missing or does not increase.
+            SourceError: A timestamp is missing, or they increase no more.
         """
         first_index: int | None = None
-        last_index, last_s, frame = -1, -math.inf, self._first
-        for last_index, frame in self._numbered_from(start_s):
-            picture, label = AvPicture(frame, self.rotation_deg, self._scaler), f"frame {last_index}"
+        last_index, latest = -1, self._first
+        for last_index, frame in self._numbered_from(wanted.start_s):
+            picture, label = self._picture(frame), f"frame {last_index}"
             check_size(picture, self.size_px, label)
             time_s = self._time_s(last_index, frame)
-            if time_s <= last_s:
-                raise SourceError(
-                    expected="timestamps that increase",
-                    found=f"{time_s:.3f} s after {last_s:.3f} s at {label} of {self._path.name}",
-                    fix="rewrap the file with ffmpeg, or give its frame rate (--fps) to replace its timestamps",
-                )
-            last_s = time_s
-            if time_s < start_s - TIME_ROUNDING_S:
+            if self._fps is None and not self._times.passes(time_s, label):
+                continue
+            latest = frame
+            if time_s < wanted.start_s - TIME_ROUNDING_S:
                 continue
             first_index = last_index if first_index is None else first_index
-            if (last_index - first_index) % every == 0:
+            if (last_index - first_index) % wanted.every == 0:
                 yield Shot(last_index, time_s, picture, label)
-        self._check_end(last_index, frame)
+        self._check_end(last_index, latest)
 
     def _numbered_from(self, start_s: float) -> Iterator[tuple[int, av.VideoFrame]]:
         """Yield all frames with their index, from the start or, where that is exact, from just before `start_s`."""
@@ -175,10 +190,10 @@ class VideoReader:
         frames = self._decoded()
         landed = next(frames, None)
         if landed is not None and landed.key_frame and landed.pts is not None and landed.pts <= start_pts:
-            wanted = (frame for frame in chain([landed], frames) if frame.pts is None or frame.pts >= start_pts)
-            shown = next(wanted, None)
-            if shown is not None:
-                return enumerate(chain([shown], wanted), start=first_index)
+            shown = dropwhile(lambda frame: frame.pts is not None and frame.pts < start_pts, chain([landed], frames))
+            first_shown = next(shown, None)
+            if first_shown is not None:
+                return enumerate(chain([first_shown], shown), start=first_index)
         self._container.close()
         self._container, self._stream = open_video(self._path)
         self._frames = self._decoded()
@@ -226,8 +241,36 @@ class VideoReader:
         )
 
     @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is odd about the file, and what was lost of it so far."""
+        found = [*self._layout, *self._times.warnings]
+        if self.corrupt_frames:
+            found.append(f"{self._path.name}: {self.corrupt_frames} pictures damaged or lost")
+        return tuple(found)
+
+    def _what_was_chosen(self) -> list[str]:
+        """Return what was done to the file's pictures that not every program would do."""
+        name, found = self._path.name, []
+        if others := passed_over(self._container, self._stream):
+            found.append(f"{name}: of its films stream {self._stream.index} is read, not {others}")
+        if self.orientation.is_mirrored:
+            found.append(f"{name}: its pictures are mirrored, as its display matrix says")
+        pixel_aspect = self._header.pixel_aspect
+        if pixel_aspect not in (None, 1):
+            stored = f"{self._first.width}x{self._first.height}"
+            square = "x".join(map(str, square_size_px((self._first.width, self._first.height), pixel_aspect)))
+            found.append(f"{name}: its pixels are not square; {stored} are stretched to {square}")
+        return found
+
+    @property
     def description(self) -> dict[str, Any]:
-        """What it is, for the record; `corrupt_frames` as counted so far."""
+        """What it is, for the record; `corrupt_frames` and `skipped_frames` as counted so far.
+
+        `size_px` is of the pictures as they are given, upright and with square pixels.
+        """
+        return self._about | {"corrupt_frames": self.corrupt_frames, "skipped_frames": self._times.skipped}
+
+    def _describe(self) -> dict[str, Any]:
         return {
             "name": self._path.name,
             "kind": "video",
@@ -235,12 +278,15 @@ class VideoReader:
             "codec": self._header.codec,
             "pixel_format": self._first.format.name,
             "size_px": list(self.size_px),
-            "rotation_deg": self.rotation_deg,
+            "stored_size_px": [self._first.width, self._first.height],
+            "pixel_aspect": str(self._header.pixel_aspect or 1),
+            **self.orientation.description,
+            "stream": self._stream.index,
+            "streams": describe_streams(self._container),
             "fps": self.rate_fps,
             "duration_s": self._header.duration_s,
             "fingerprint": fingerprint([self._path]),
             "frames_declared": self._header.declared_frames or None,
-            "corrupt_frames": self.corrupt_frames,
             "clock": "presentation timestamps" if self._fps is None else "given frame rate",
         }
 
