@@ -33,7 +33,7 @@ def test_a_pointer_is_named_with_what_to_do(tmp_path: Path, kind: str) -> None:
         read(tmp_path / name)
     line = str(caught.value)
     assert "\n" not in line
-    assert re.search(rf"{re.escape(name)}, found a Git LFS pointer, not the file\. Run `git lfs pull`", line)
+    assert re.search(rf"{re.escape(name)}.*a Git LFS pointer, not the file[.:] [Rr]un `git lfs pull`", line)
 
 
 def test_a_labelled_picture_that_is_a_pointer_is_counted_with_the_reason(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ from typing import BinaryIO, Final
 
 from PIL import ExifTags, Image, UnidentifiedImageError
 
+from standoff.files.lfs import FETCH, POINTER, is_pointer
 from standoff.stages.frames.orientation import Orientation
 
 _JPEG_START, _JPEG_SCAN, _JPEG_END = b"\xff\xd8", b"\xff\xda", b"\xff\xd9"
@@ -61,6 +62,8 @@ def read_header(path: Path) -> PictureHeader:
     except FileNotFoundError:
         raise
     except UnidentifiedImageError as error:
+        if is_pointer(path):
+            raise UnreadablePicture(f"it is {POINTER}: {FETCH}") from error
         raise UnreadablePicture("it is of no known format" if path.stat().st_size else "it is empty") from error
     except (OSError, ValueError, SyntaxError, KeyError, TypeError, struct.error, Image.DecompressionBombError) as error:
         raise UnreadablePicture(str(getattr(error, "strerror", None) or error) or type(error).__name__) from error

@@ -22,7 +22,7 @@ from standoff.core.types import ImageArray
 from standoff.files.lfs import refuse_pointer
 
 PICTURE_SUFFIXES = (".bmp", ".jpeg", ".jpg", ".png", ".tif", ".tiff", ".webp")
-_SMALLEST_SQUARE_M, _LARGEST_SQUARE_M = 0.001, 2.0
+_SMALLEST_SQUARE_M, _LARGEST_SQUARE_M = 0.001, 5.0
 """From boards for microscopes to boards painted on the ground."""
 _WINDOW_OF_SQUARE = 0.3
 _SUBPIXEL_STOP = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 100, 1e-4)
