@@ -11,7 +11,7 @@ from pointers import POINTER
 
 from standoff.core.errors import StandoffError
 from standoff.files.lfs import is_pointer
-from standoff.labels.pictures import read_size_px
+from standoff.labels.pictures import canvas_of
 from standoff.labels.source import BadPicture
 from standoff.stages.detect import OnnxDetector
 from standoff.stages.frames import open_source
@@ -40,7 +40,7 @@ def test_a_labelled_picture_that_is_a_pointer_is_counted_with_the_reason(tmp_pat
     path = tmp_path / "0.jpg"
     path.write_text(POINTER)
     with pytest.raises(BadPicture, match="a Git LFS pointer, not the file"):
-        read_size_px(path)
+        canvas_of(path, None, marked=True)
 
 
 def test_what_is_no_pointer_is_none(tmp_path: Path) -> None:

@@ -1,15 +1,17 @@
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from labelled_sets import by_stem, kinds, write_picture, write_yolo
-from PIL import Image
+from PIL import ExifTags, Image, ImageOps
 
 from standoff.core.errors import DataError
 from standoff.labels import LabelledPicture, load_picture, read_data
@@ -41,6 +43,16 @@ def test_an_empty_label_file_is_a_picture_without_objects(tmp_path: Path) -> Non
         ("2 0.5 0.5 0.5 0.5\n", "unknown class id"),
         ("-1 0.5 0.5 0.5 0.5\n", "unknown class id"),
         ("0.5 0.5 0.5 0.5 0.5\n", "unknown class id"),
+        ("0 20 15 20 15\n", "labels cannot be placed"),
+        ("0 50 50 50 50\n", "labels cannot be placed"),
+        (_GOOD + "0 1e300 0.5 1e300 1\n", "labels cannot be placed"),
+        ("0 1.5 0.5 0.5 0.5\n", "labels cannot be placed"),
+        ("0 0.5 0.5 0 0.5\n", "labels cannot be placed"),
+        ("0 10 10 20 10 20 20 10 20\n", "labels cannot be placed"),
+        ("0 0.5 0.5 0.5 0.5 0.87\n", "unreadable labels"),
+        ("0 0.5 0.5 0.5 0.5 0.4 0.4 1 0.3 0.3 1\n", "unreadable labels"),
+        ("0 0.1 0.1 0.4 0.1 0.4 0.4 0.1 0.4\n0 0.1 0.1 0.4 0.1 0.4 0.4 0.1 0.4\n0 0.1 0.1 0.4 0.", "unreadable labels"),
+        ("0 0.1 0.1 0.4 0.1 0.4 0.4 0.1\n", "unreadable labels"),
         (_GOOD + "1 0.5 0.5 0.5 0.5\n", "contradictory labels"),
         (_GOOD + "1 0.5005 0.4995 0.5 0.5\n", "contradictory labels"),
     ],
@@ -61,7 +73,7 @@ def test_bad_labels_cost_their_picture(tmp_path: Path, content: str | bytes, kin
         (_GOOD + "0 0.5 0.5 -0.1 0.5\n", "box without area", [[9.5, 7.0, 29.5, 22.0]]),
         (_GOOD + "0 1.5 0.5 0.5 0.5\n", "box outside the picture", [[9.5, 7.0, 29.5, 22.0]]),
         ("0 1.0 0.5 0.5 0.5\n", "box cut at the picture's edge", [[29.5, 7.0, 39.5, 22.0]]),
-        ("0 1e300 0.5 1e300 1\n0 0.5 0.5 1 1\n", "box outside the picture", [[-0.5, -0.5, 39.5, 29.5]]),
+        ("0 -1.9 0.5 1.9 1\n0 0.5 0.5 1 1\n", "box outside the picture", [[-0.5, -0.5, 39.5, 29.5]]),
     ],
 )
 def test_bad_boxes_are_mended_or_dropped_and_said(
@@ -106,8 +118,18 @@ def test_whatever_is_marked_what_is_left_lies_inside_and_has_an_area(
     picture = SourcePicture(Path("p.png"), size_px, labels, xyxy_px, np.zeros(len(marks), np.bool_))
     try:
         boxes = check_boxes(picture, {"worker": 0, "digger": 1, "tree": None})
-    except BadPicture:
-        assert len({mark[:4] for mark in marks}) < len(marks)
+    except BadPicture as error:
+        if error.problem.kind == "contradictory labels":
+            assert len({mark[:4] for mark in marks}) < len(marks)
+        elif "first pixels" in error.problem.found:
+            meant = np.array(labels) != "cloud"
+            assert np.abs(xyxy_px[meant]).max() <= 2.0 < min(size_px) / 8
+        else:
+            left_top = np.maximum(xyxy_px[:, :2], -0.5)
+            right_bottom = np.minimum(xyxy_px[:, 2:], np.array(size_px) - 0.5)
+            meant = np.array(labels) != "cloud"
+            assert meant.any()
+            assert (right_bottom - left_top < 0.5)[meant].any(axis=1).all()
         return
     assert (boxes.xyxy_px >= -0.5).all()
     assert (boxes.xyxy_px <= np.tile(size_px, 2) - 0.5).all()
@@ -137,18 +159,75 @@ def _labelled(path: Path, size_px: tuple[int, int]) -> LabelledPicture:
     return LabelledPicture(path, size_px, np.zeros((0, 4)), none, none.astype(np.bool_), "g", "s")
 
 
-@pytest.mark.parametrize("orientation", range(1, 9))
-def test_pictures_are_taken_as_stored_whatever_exif_says(tmp_path: Path, orientation: int) -> None:
-    pixels = np.random.default_rng(orientation).integers(0, 256, (30, 40, 3), dtype=np.uint8)
+def _turned_picture(path: Path, orientation: int, size_px: tuple[int, int] = (40, 30)) -> npt.NDArray[np.uint8]:
+    """Write a picture of noise that EXIF data turn, and return its stored pixels, blue first."""
+    pixels = np.random.default_rng(orientation).integers(0, 256, (size_px[1], size_px[0], 3), dtype=np.uint8)
     exif = Image.Exif()
-    exif[274] = orientation
-    (tmp_path / "images").mkdir()
-    Image.fromarray(pixels).save(tmp_path / "images" / "turned.png", exif=exif)
-    (tmp_path / "images" / "turned.txt").write_text(_GOOD)
-    (tmp_path / "classes.txt").write_text("worker\n")
-    picture = by_stem(read_data(tmp_path))["turned"]
-    assert picture.size_px == (40, 30)
-    np.testing.assert_array_equal(load_picture(picture), pixels[:, :, ::-1])
+    exif[ExifTags.Base.Orientation] = orientation
+    path.parent.mkdir(parents=True, exist_ok=True)
+    Image.fromarray(pixels).save(path, exif=exif)
+    return pixels[:, :, ::-1]
+
+
+@pytest.mark.parametrize("orientation", range(1, 9))
+def test_a_turned_picture_whose_labels_do_not_tell_for_which_they_are_is_left_out(
+    tmp_path: Path, orientation: int
+) -> None:
+    folder = write_yolo(tmp_path, _FILL)
+    pixels = _turned_picture(folder / "images" / "turned.png", orientation)
+    (folder / "labels" / "turned.txt").write_text(_GOOD)
+    data = read_data(tmp_path)
+    if orientation == 1:
+        assert data.problems == []
+        np.testing.assert_array_equal(load_picture(by_stem(data)["turned"]), pixels)
+        return
+    (problem,) = data.problems
+    assert (problem.kind, problem.path.name, problem.skipped_picture) == ("turned by EXIF data", "turned.png", True)
+    assert set(by_stem(data)) == set(_FILL)
+
+
+@pytest.mark.parametrize("orientation", range(2, 9))
+def test_a_turned_picture_without_labels_is_upright_as_pillow_has_it(tmp_path: Path, orientation: int) -> None:
+    folder = write_yolo(tmp_path, _FILL)
+    path = folder / "images" / "turned.png"
+    _turned_picture(path, orientation)
+    (folder / "labels" / "turned.txt").write_text("")
+    data = read_data(tmp_path)
+    assert [(problem.kind, problem.skipped_picture) for problem in data.problems] == [("turned by EXIF data", False)]
+    picture = by_stem(data)["turned"]
+    with Image.open(path) as stored:
+        expected = np.asarray(ImageOps.exif_transpose(stored))[:, :, ::-1]
+    assert picture.size_px == expected.shape[1::-1]
+    np.testing.assert_array_equal(load_picture(picture), expected)
+    assert load_picture(picture, 2).shape[:2] == tuple(side // 2 for side in expected.shape[:2])
+
+
+@pytest.mark.parametrize("stated_px", [(40, 30), (30, 40)])
+@pytest.mark.parametrize("orientation", range(2, 9))
+def test_the_size_that_labels_state_tells_how_a_turned_picture_lies_for_them(
+    tmp_path: Path, orientation: int, stated_px: tuple[int, int]
+) -> None:
+    images = []
+    for number in range(1, 5):
+        path = tmp_path / f"{number}.png"
+        stored = _turned_picture(path, orientation if number == 1 else 1)
+        size_px = stated_px if number == 1 else (40, 30)
+        images.append({"id": number, "file_name": path.name, "width": size_px[0], "height": size_px[1]})
+        if number == 1:
+            turned, upright = stored, np.asarray(ImageOps.exif_transpose(Image.open(path)))[:, :, ::-1]
+    boxes = [{"image_id": number, "category_id": 1, "bbox": [2, 3, 10, 20]} for number in range(1, 5)]
+    content = {"images": images, "annotations": boxes, "categories": [{"id": 1, "name": "worker"}]}
+    (tmp_path / "labels.json").write_text(json.dumps(content))
+    data = read_data(tmp_path / "labels.json")
+    (problem,) = data.problems
+    assert problem.path.name == "1.png"
+    if orientation >= 5:
+        expected = turned if stated_px == (40, 30) else upright
+        np.testing.assert_array_equal(load_picture(by_stem(data)["1"]), expected)
+        assert (problem.kind, problem.skipped_picture) == ("turned by EXIF data", False)
+    else:
+        kind = "turned by EXIF data" if stated_px == (40, 30) else "size differs from labels"
+        assert (problem.kind, problem.skipped_picture) == (kind, True)
 
 
 @pytest.mark.parametrize("suffix", [".jpg", ".png", ".bmp", ".webp", ".tif"])

@@ -11,7 +11,7 @@ import numpy as np
 from standoff.core.boxes import overlaps
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import IntArray
-from standoff.labels.source import BadPicture, SourcePicture
+from standoff.labels.source import UNPLACEABLE, BadPicture, SourcePicture
 from standoff.labels.types import Problem
 
 _ROUNDING_PX: Final = 1.0
@@ -19,6 +19,8 @@ _ROUNDING_PX: Final = 1.0
 _MIN_SIDE_PX: Final = 0.5
 _TWICE_IOU: Final = 0.95
 """Nobody marks two things of a class so alike; two passes over the same picture mark one thing so."""
+_SHARES_PX: Final = 2.0
+"""No further from the corner than this lie boxes whose numbers are not pixels."""
 _CONTRADICTORY_IOU: Final = 0.99
 """Of two classes: a rider and what is ridden may be nearly one box."""
 
@@ -50,7 +52,8 @@ def check_boxes(picture: SourcePicture, class_ids: Mapping[str, int | None]) -> 
         class_ids: Of each label that is kept; None: the label's boxes are ignored regions. Others are dropped.
 
     Raises:
-        BadPicture: One box has two classes.
+        BadPicture: One box has two classes, or all boxes are nowhere, or may be: such a picture is not one
+            without things.
     """
     kept = np.array([label in class_ids for label in picture.labels], np.bool_)
     ids = [class_ids[label] for label in picture.labels if label in class_ids]
@@ -69,6 +72,11 @@ def check_boxes(picture: SourcePicture, class_ids: Mapping[str, int | None]) -> 
         (first & real & ~visible, "box outside the picture"),
         (first & cut, "box cut at the picture's edge"),
     )
+    if len(xyxy_px) and np.abs(xyxy_px).max() <= _SHARES_PX < min(picture.size_px) / 8:
+        found = f"all {len(xyxy_px)} boxes in the first pixels: shares of the picture where pixels are expected?"
+        raise BadPicture(picture.path, found, UNPLACEABLE)
+    if len(xyxy_px) and not visible.any():
+        raise BadPicture(picture.path, _nowhere(xyxy_px), UNPLACEABLE)
     problems = tuple(_mended(picture, int(where.sum()), kind) for where, kind in faults if where.any())
     good = first & visible
     return CheckedBoxes(cut_px[good], class_id[good], ignored[good], picture.foot_px[kept][good], problems)
@@ -97,6 +105,11 @@ def _first_of_each(picture: SourcePicture, xyxy_px: FloatArray, class_id: IntArr
 
 def _has_area(xyxy_px: FloatArray) -> BoolArray:
     return np.asarray((xyxy_px[:, 2:] - xyxy_px[:, :2]).min(axis=1, initial=np.inf) >= _MIN_SIDE_PX)
+
+
+def _nowhere(xyxy_px: FloatArray) -> str:
+    first = " ".join(f"{number:g}" for number in np.clip(xyxy_px[0], -1e9, 1e9).round(1))
+    return f"none of its {len(xyxy_px)} boxes has an area in the picture, the first is at {first}"
 
 
 def _mended(picture: SourcePicture, count: int, kind: str) -> Problem:

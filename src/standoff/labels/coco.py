@@ -10,21 +10,29 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
 from standoff.core.boxes import unknown_points
 from standoff.core.errors import DataError
 from standoff.core.homography import FloatArray
+from standoff.labels.coco_boxes import read_bboxes
 from standoff.labels.documents import read_json
 from standoff.labels.ground_points import KEYPOINT
-from standoff.labels.pictures import first_file, read_size_px
-from standoff.labels.source import BadPicture, SourcePicture, SourceSet, read_each, split_named
+from standoff.labels.layout_doubts import check_counting, check_not_corners
+from standoff.labels.pictures import canvas_of
+from standoff.labels.places import elsewhere, find_named
+from standoff.labels.source import UNPLACEABLE, BadPicture, SourcePicture, SourceSet, read_each, split_named
 from standoff.labels.types import Problem, Split
 
 _Entry = Mapping[str, Any]
 _Id = int | str
+_LONGEST_ID: Final = 30
+_LARGEST: Final = 1e18
+"""Of the numbers that are looked at; JSON has no largest."""
+_LOST_SHARE: Final = 0.1
+"""Of the pictures without a box: where annotations of so many others are lost, they may be theirs."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,6 +48,7 @@ class _CocoFile:
         boxes: Annotations by image id.
         lost: Annotations of images that are not listed.
         shared: Ids that more than one image has: whose boxes are whose?
+        doubtful: Whether pictures without a box may be those whose annotations are lost.
         split: Of all its pictures; None: its name does not say.
     """
 
@@ -51,6 +60,7 @@ class _CocoFile:
     boxes: Mapping[_Id, Sequence[_Entry]]
     lost: Sequence[_Entry]
     shared: frozenset[_Id]
+    doubtful: bool
     split: Split | None
 
 
@@ -68,6 +78,11 @@ def read_coco(paths: Sequence[Path], pictures: Path | None) -> SourceSet:
     files = [_open(path, read_json(path), pictures) for path in paths]
     listed = [(file, image) for file in files for image in file.images]
     found, problems = read_each(listed, _read_picture)
+    for file in files:
+        check_counting(
+            {_id(box, "category_id") for boxes in file.boxes.values() for box in boxes}, file.labels, file.path
+        )
+    check_not_corners(found, paths[0], centred=False)
     lost = [_lost(file.path, box) for file in files for box in file.lost]
     return SourceSet(
         tuple(dict.fromkeys(label for file in files for label in file.labels.values())), found, problems + lost
@@ -83,20 +98,36 @@ def _open(path: Path, content: dict[str, Any], pictures: Path | None) -> _CocoFi
         boxes.get(_id(entry, "image_id"), lost).append(entry)
     shared = frozenset(number for number, count in Counter(_id(entry, "id") for entry in images).items() if count > 1)
     labels = {_id(entry, "id"): str(entry["name"]) for entry in named}
+    _check_categories(named, path)
     keypoints = {_id(entry, "id"): entry.get("keypoints") for entry in named}
     point_at = {
         number: names.index(KEYPOINT)
         for number, names in keypoints.items()
         if isinstance(names, list) and KEYPOINT in names
     }
-    return _CocoFile(
-        path, _folders(path, pictures), labels, point_at, images, boxes, lost, shared, split_named(path.stem)
-    )
+    folders, split = _folders(path, pictures), split_named(path.stem)
+    return _CocoFile(path, folders, labels, point_at, images, boxes, lost, shared, _doubtful(boxes, lost), split)
+
+
+def _check_categories(named: Sequence[_Entry], path: Path) -> None:
+    """Refuse two labels under one id: whose boxes are they?"""
+    labels: dict[_Id, str] = {}
+    for entry in named:
+        if (known := labels.setdefault(_id(entry, "id"), str(entry["name"]))) != str(entry["name"]):
+            found = f"{entry.get('id')} of {known} and {entry['name']}"
+            raise DataError(expected=f"an id of its own for each category in {path}", found=found, fix="correct it")
+
+
+def _doubtful(boxes: Mapping[_Id, Sequence[_Entry]], lost: Sequence[_Entry]) -> bool:
+    unmarked = sum(not entries for entries in boxes.values())
+    return len({_id(entry, "image_id") for entry in lost}) > _LOST_SHARE * unmarked
 
 
 def _id(entry: _Entry, key: str) -> _Id:
-    """Return an id; whatever a damaged file has instead, as text."""
+    """Return an id, a number written as text as the number; whatever a damaged file has instead, as text."""
     value = entry.get(key)
+    if isinstance(value, str) and value.isascii() and value.isdecimal() and len(value) < _LONGEST_ID:
+        return int(value)
     return value if isinstance(value, (int, str)) else repr(value)
 
 
@@ -107,7 +138,8 @@ def _lost(path: Path, entry: _Entry) -> Problem:
 
 def _sortable(number: object) -> tuple[str, float, str]:
     """Order numbers as numbers, and whatever else somebody takes for ids as text."""
-    return (type(number).__name__, float(number) if isinstance(number, (int, float)) else 0.0, str(number))
+    is_number = isinstance(number, (int, float)) and abs(number) < _LARGEST
+    return (type(number).__name__, float(number) if is_number else 0.0, str(number))  # type: ignore[arg-type]
 
 
 def _folders(path: Path, pictures: Path | None) -> tuple[Path, ...]:
@@ -135,35 +167,41 @@ def _read_picture(listed: tuple[_CocoFile, _Entry]) -> SourcePicture:
     name = image.get("file_name")
     if not isinstance(name, str) or not name:
         raise BadPicture(file.path, f"image {image.get('id')} without file_name", "picture without name")
-    path = first_file([folder / name for folder in file.folders])
-    size_px = read_size_px(path)
-    stated = image.get("width") or size_px[0], image.get("height") or size_px[1]
-    if stated != size_px:
-        raise BadPicture(path, f"{size_px} pixels where its labels say {stated}", "size differs from labels")
+    path, reading = find_named(name, file.folders)
+    boxes = file.boxes[_id(image, "id")]
+    canvas = canvas_of(path, _stated_px(image, path), marked=bool(boxes))
     if _id(image, "id") in file.shared:
         raise BadPicture(path, f"its id {image.get('id')} is another picture's as well", "contradictory labels")
-    boxes = file.boxes[_id(image, "id")]
+    if not boxes and file.doubtful:
+        found = f"no box, where {file.path.name} has {len(file.lost)} of pictures that it does not list"
+        raise BadPicture(path, found, UNPLACEABLE)
     categories = [_id(box, "category_id") for box in boxes]
     unknown = [category for category in categories if category not in file.labels]
     if unknown:
         raise BadPicture(path, f"category {unknown[0]}, which {file.path.name} does not list", "unknown class id")
-    try:
-        corners = np.array([box["bbox"] for box in boxes], dtype=np.float64).reshape(len(boxes), 4)
-    except (KeyError, TypeError, ValueError) as error:
-        raise BadPicture(path, "an annotation whose bbox is not four numbers", "unreadable labels") from error
-    if not np.isfinite(corners).all():
-        raise BadPicture(path, "a number that is not finite", "unreadable labels")
-    corners[:, 2:] += corners[:, :2]
+    corners = read_bboxes(boxes, path)
     return SourcePicture(
         path,
-        size_px,
+        canvas.size_px,
         tuple(file.labels[category] for category in categories),
         corners - 0.5,
         np.array([bool(box.get("iscrowd")) for box in boxes], np.bool_),
         file.split,
         str(image.get("scene", "")),
         _points(boxes, categories, file.point_at, path),
+        canvas.orientation,
+        (*elsewhere(path, name, reading), *canvas.notes),
     )
+
+
+def _stated_px(image: _Entry, path: Path) -> tuple[float, float] | None:
+    """Return the size that is stated; None where it is not, or 0."""
+    width, height = image.get("width") or None, image.get("height") or None
+    if width is None or height is None:
+        return None
+    if not all(isinstance(side, (int, float)) and abs(side) < _LARGEST for side in (width, height)):
+        raise BadPicture(path, "a size that is not two numbers", "unreadable labels")
+    return float(width), float(height)
 
 
 def _points(boxes: Sequence[_Entry], categories: Sequence[_Id], point_at: Mapping[_Id, int], path: Path) -> FloatArray:
@@ -175,7 +213,7 @@ def _points(boxes: Sequence[_Entry], categories: Sequence[_Id], point_at: Mappin
         start = 3 * point_at[category]
         try:
             x, y, visibility = (float(number) for number in box["keypoints"][start : start + 3])
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, OverflowError) as error:
             raise BadPicture(path, "an annotation whose keypoints are not numbers", "unreadable labels") from error
         if visibility and np.isfinite([x, y]).all():
             points[row] = x - 0.5, y - 0.5

@@ -10,7 +10,7 @@ import numpy as np
 
 from standoff.core.errors import DataError
 from standoff.labels.coco import read_coco
-from standoff.labels.pictures import find_pictures, read_size_px
+from standoff.labels.pictures import canvas_of, find_pictures
 from standoff.labels.source import SourcePicture, SourceSet, read_each, split_named
 from standoff.labels.voc import read_voc
 from standoff.labels.yolo import read_yolo_folder, read_yolo_yaml
@@ -68,7 +68,16 @@ def read_negatives(folder: Path) -> SourceSet:
 
 
 def _unmarked(path: Path) -> SourcePicture:
-    return SourcePicture(path, read_size_px(path), (), np.zeros((0, 4)), np.zeros(0, np.bool_))
+    canvas = canvas_of(path, None, marked=False)
+    return SourcePicture(
+        path,
+        canvas.size_px,
+        (),
+        np.zeros((0, 4)),
+        np.zeros(0, np.bool_),
+        orientation=canvas.orientation,
+        notes=canvas.notes,
+    )
 
 
 def _coco_files(folder: Path) -> list[Path]:

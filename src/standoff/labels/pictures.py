@@ -1,13 +1,8 @@
-"""Picture files: find them, read their size, load their pixels.
-
-Pictures are taken as stored: a rotation that only EXIF asks for is never applied, neither to the size nor to the
-pixels, because boxes belong to one of the two and label files do not say which.
-"""
+"""Picture files: find them, tell how they lie for their labels, load their pixels."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from contextlib import suppress
+from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
 from typing import Final
@@ -20,9 +15,13 @@ from standoff.core.errors import DataError
 from standoff.core.types import ImageArray
 from standoff.files.lfs import POINTER, is_pointer, refuse_pointer
 from standoff.labels.source import BadPicture
-from standoff.labels.types import UNREADABLE, LabelledPicture
+from standoff.labels.types import UNREADABLE, LabelledPicture, Problem
+from standoff.stages.frames.orientation import UPRIGHT, Orientation
+from standoff.stages.frames.picture_header import PictureHeader, UnreadablePicture, read_header
 
 SUFFIXES: Final = frozenset({".bmp", ".jpeg", ".jpg", ".png", ".tif", ".tiff", ".webp"})
+TURNED: Final = "turned by EXIF data"
+"""Kind of problem of a picture that does not lie in its file as viewers show it."""
 _WHOLE_ENDINGS: Final = (b"\xff\xd9", b"IEND\xaeB`\x82")
 """Last bytes of whole JPEG and PNG files. OpenCV decodes half a file without a word and paints the rest grey."""
 _READ_AS: Final = {
@@ -39,34 +38,69 @@ def find_pictures(folder: Path) -> list[Path]:
     return sorted(path for path in found if not any(part.startswith(".") for part in path.relative_to(folder).parts))
 
 
-def first_file(candidates: Sequence[Path]) -> Path:
-    """Return the first of some paths that is a file; the very first if none is."""
-    for candidate in candidates:
-        # a name out of a damaged label file may be too long to be looked for
-        with suppress(OSError):
-            if candidate.is_file():
-                return candidate
-    return candidates[0]
+@dataclass(frozen=True, slots=True)
+class Canvas:
+    """A picture as its labels take it.
+
+    Attributes:
+        size_px: (width, height).
+        orientation: What makes it of the stored picture.
+        notes: Where that is not as stored.
+    """
+
+    size_px: tuple[int, int]
+    orientation: Orientation = UPRIGHT
+    notes: tuple[Problem, ...] = ()
 
 
-def read_size_px(path: Path) -> tuple[int, int]:
-    """Return a picture's (width, height) from its header alone.
+def canvas_of(path: Path, stated_px: tuple[float, float] | None, *, marked: bool) -> Canvas:
+    """Return how a picture lies for its labels, from its header alone.
+
+    Where EXIF data turn it, its labels are for the stored picture or for the upright one: the size that they state
+    tells, or nothing does.
+
+    Args:
+        path: Of the picture.
+        stated_px: (width, height) that its labels state; None: they do not.
+        marked: Whether there are labels at all; a picture without any is upright.
 
     Raises:
-        BadPicture: There is no such file, or its header cannot be read.
+        BadPicture: It cannot be read, has another size than stated, or is turned nobody knows how.
     """
+    header = _read_header(path)
+    stored_px, upright_px = header.stored_px, header.size_px
+    if stated_px is not None and stated_px not in (stored_px, upright_px):
+        swapped = ", width and height swapped" if stated_px == stored_px[::-1] else ""
+        found = "{}x{} pixels where its labels say {:g}x{:g}".format(*stored_px, *stated_px)
+        raise BadPicture(path, found + swapped, "size differs from labels")
+    if header.orientation.is_upright:
+        return Canvas(stored_px)
+    if header.file_format == "TIFF":
+        raise BadPicture(path, "a TIFF file that its orientation turns", TURNED)
+    for_stored, for_upright = (stated_px == size_px for size_px in (stored_px, upright_px))
+    if marked and for_stored and not for_upright:
+        return Canvas(stored_px, UPRIGHT, (_note(path, "turned by its EXIF data, its labels are not: read as stored"),))
+    if marked and (for_stored or not for_upright):
+        found = "turned by its EXIF data, and its labels may be for the stored or the upright one: save it upright"
+        raise BadPicture(path, found, TURNED)
+    return Canvas(upright_px, header.orientation, (_note(path, "turned as its EXIF data say"),))
+
+
+def _note(path: Path, found: str) -> Problem:
+    return Problem(path, found, TURNED, skipped_picture=False)
+
+
+def _read_header(path: Path) -> PictureHeader:
     try:
-        with Image.open(path) as picture:
-            return picture.size
+        return read_header(path)
     except FileNotFoundError as error:
         raise BadPicture(path, "no such file", "picture missing") from error
-    except (OSError, ValueError, Image.DecompressionBombError) as error:
-        reason = POINTER if is_pointer(path) else f"not a picture ({_reason(error)})"
-        raise BadPicture(path, reason, UNREADABLE) from error
+    except UnreadablePicture as error:
+        raise BadPicture(path, POINTER if is_pointer(path) else f"not a picture ({error})", UNREADABLE) from error
 
 
 def load_picture(picture: LabelledPicture, reduction: int = 1) -> ImageArray:
-    """Decode a picture as stored.
+    """Decode a picture, turned as its labels are.
 
     Args:
         picture: Which.
@@ -78,22 +112,43 @@ def load_picture(picture: LabelledPicture, reduction: int = 1) -> ImageArray:
     Raises:
         DataError: It cannot be decoded, is cut short, or has another size than its header said.
     """
-    try:
-        coded = picture.path.read_bytes()
-        if not coded.endswith(_WHOLE_ENDINGS):
-            with Image.open(BytesIO(coded)) as strict:
-                strict.load()
-        image = cv2.imdecode(np.frombuffer(coded, np.uint8), _READ_AS[reduction] | cv2.IMREAD_IGNORE_ORIENTATION)
-    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError, cv2.error) as error:
-        refuse_pointer(picture.path, f"a picture in {picture.path}", DataError)
-        raise _undecodable(picture.path, _reason(error)) from error
-    if image is None:
-        raise _undecodable(picture.path, "OpenCV cannot decode it")
+    image = _decoded(picture.path, picture.orientation, _READ_AS[reduction])
     width_px, height_px = (side * reduction for side in image.shape[1::-1])
     if abs(width_px - picture.size_px[0]) >= reduction or abs(height_px - picture.size_px[1]) >= reduction:
         expected = f"{picture.size_px[0]}x{picture.size_px[1]} pixels, as the header says, in {picture.path}"
         raise DataError(expected=expected, found=f"{width_px}x{height_px}", fix="save the picture again")
-    return np.asarray(image)
+    return image
+
+
+def load_upright(path: Path) -> ImageArray:
+    """Decode a picture without labels, turned as its EXIF data say.
+
+    Returns:
+        (H, W, 3) uint8, blue first.
+
+    Raises:
+        DataError: It cannot be decoded, or is cut short.
+    """
+    try:
+        canvas = canvas_of(path, None, marked=False)
+    except BadPicture as error:
+        raise _undecodable(path, error.problem.found) from error
+    return _decoded(path, canvas.orientation, cv2.IMREAD_COLOR)
+
+
+def _decoded(path: Path, orientation: Orientation, read_as: int) -> ImageArray:
+    try:
+        coded = path.read_bytes()
+        if not coded.endswith(_WHOLE_ENDINGS):
+            with Image.open(BytesIO(coded)) as strict:
+                strict.load()
+        image = cv2.imdecode(np.frombuffer(coded, np.uint8), read_as | cv2.IMREAD_IGNORE_ORIENTATION)
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError, cv2.error) as error:
+        refuse_pointer(path, f"a picture in {path}", DataError)
+        raise _undecodable(path, _reason(error)) from error
+    if image is None:
+        raise _undecodable(path, "OpenCV cannot decode it")
+    return orientation.upright(np.asarray(image))
 
 
 def _undecodable(path: Path, reason: str) -> DataError:

@@ -16,6 +16,7 @@ from standoff.core.homography import FloatArray
 from standoff.labels.checks import check_boxes, inside
 from standoff.labels.layout import read_negatives, read_set
 from standoff.labels.mixture import DROP, IGNORE, Mixture, Source, is_mixture, read_mixture
+from standoff.labels.pictures import TURNED
 from standoff.labels.regions import OWN_REGIONS, read_regions
 from standoff.labels.source import BadPicture, SourcePicture, SourceSet
 from standoff.labels.splits import group_of, is_divided, split_pictures
@@ -51,6 +52,9 @@ def read_data(path: Path) -> LabelledData:
     kept = [name for names in maps for name in names.values() if name not in (IGNORE, DROP)]
     classes = mixture.classes or tuple(dict.fromkeys(kept))
     if not classes:
+        for source, one in zip(mixture.sources, sets, strict=True):
+            if one.problems and not one.pictures:  # that there are no classes is not what must be repaired
+                _require_enough(source, 0, one.problems)
         raise DataError(expected=f"classes in {path}", found="none", fix="add a set with labels, or `classes`")
     splits: dict[Split, list[LabelledPicture]] = {split: [] for split in SPLITS}
     problems: list[Problem] = []
@@ -163,6 +167,8 @@ def _label(
     picture: SourcePicture, place: _Place, class_ids: Mapping[str, int | None]
 ) -> tuple[LabelledPicture, tuple[Problem, ...]]:
     boxes = check_boxes(picture, class_ids)
+    if len(place.regions_px) and any(note.kind == TURNED for note in picture.notes):
+        raise BadPicture(picture.path, "turned by its EXIF data, and it has ignored regions", TURNED)
     regions_px = inside(place.regions_px, picture.size_px)
     regions_px = regions_px[(regions_px[:, :2] < regions_px[:, 2:]).all(axis=1)]
     labelled = LabelledPicture(
@@ -175,6 +181,7 @@ def _label(
         place.source.name,
         place.source.weight,
         np.concatenate([boxes.foot_px, unknown_points(len(regions_px))]),
+        picture.orientation,
     )
     return labelled, boxes.problems
 

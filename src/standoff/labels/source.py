@@ -11,7 +11,12 @@ from typing import Final, TypeVar
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.labels.ground_points import NO_POINTS, one_point_a_box
 from standoff.labels.types import Problem, Split
+from standoff.stages.frames.orientation import UPRIGHT, Orientation
 
+ELSEWHERE: Final = "found elsewhere than its labels say"
+"""Kind of problem of a file whose path is of another computer."""
+UNPLACEABLE: Final = "labels cannot be placed"
+"""Kind of problem of a picture whose boxes are not where its layout has them."""
 _Item = TypeVar("_Item")
 
 _SPLIT_WORDS: Final[tuple[tuple[str, Split], ...]] = (
@@ -45,13 +50,15 @@ class SourcePicture:
 
     Attributes:
         path: Of the picture.
-        size_px: (width, height) as stored.
+        size_px: (width, height) as its labels take it.
         labels: One for each box, in the set's own words.
         xyxy_px: (N, 4) as marked, possibly outside the picture; 0 is the centre of the first pixel.
         ignored: (N,) True where the set says that nothing is known.
         split: Where the set puts it; None: it does not say.
         scene: What the set calls its scene; empty: it does not say.
         foot_px: (N, 2) where the middle of each footprint appears, as in `LabelledPicture`; left out: nowhere marked.
+        orientation: What makes of the stored picture the one that is marked.
+        notes: What is odd about it and cost nothing.
     """
 
     path: Path
@@ -62,6 +69,8 @@ class SourcePicture:
     split: Split | None = None
     scene: str = ""
     foot_px: FloatArray = field(default_factory=lambda: NO_POINTS)
+    orientation: Orientation = UPRIGHT
+    notes: tuple[Problem, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "foot_px", one_point_a_box(self.foot_px, self.xyxy_px))
@@ -85,9 +94,14 @@ class SourceSet:
 def read_each(
     items: Iterable[_Item], read: Callable[[_Item], SourcePicture]
 ) -> tuple[list[SourcePicture], list[Problem]]:
-    """Read picture after picture; one that is bad, or that came before, becomes a problem and stops nothing."""
+    """Read picture after picture; one that is bad, or that came before, becomes a problem and stops nothing.
+
+    Of two entries that led to one file the first is right, unless one of them names another file that is not there:
+    then nobody knows whose labels are whose, and the file is left out.
+    """
     pictures: dict[Path, SourcePicture] = {}
     problems: list[Problem] = []
+    unsure: set[Path] = set()
     for item in items:
         try:
             picture = read(item)
@@ -96,9 +110,14 @@ def read_each(
             continue
         if picture.path in pictures:
             problems.append(Problem(picture.path, "listed twice", "picture listed twice", skipped_picture=True))
+            both = (*picture.notes, *pictures[picture.path].notes)
+            unsure |= {picture.path} if any(note.kind == ELSEWHERE for note in both) else set()
         else:
             pictures[picture.path] = picture
-    return list(pictures.values()), problems
+    found = "entries with other paths, which are not there, may mean it"
+    problems += [Problem(path, found, "contradictory labels", skipped_picture=True) for path in sorted(unsure)]
+    kept = [picture for path, picture in pictures.items() if path not in unsure]
+    return kept, problems + [note for picture in kept for note in picture.notes]
 
 
 def split_named(name: str) -> Split | None:

@@ -10,6 +10,7 @@ from typing import Literal, get_args
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import IntArray
 from standoff.labels.ground_points import NO_POINTS, one_point_a_box
+from standoff.stages.frames.orientation import UPRIGHT, Orientation
 
 Split = Literal["train", "val", "test"]
 SPLITS: tuple[Split, ...] = get_args(Split)
@@ -23,7 +24,7 @@ class LabelledPicture:
 
     Attributes:
         path: Of the picture.
-        size_px: (width, height).
+        size_px: (width, height) as its labels take it.
         xyxy_px: (N, 4) left, top, right, bottom edges, inside the picture; 0 is the centre of the first pixel, so that
             a box over the whole picture is -0.5 to width - 0.5.
         class_id: (N,) position in `LabelledData.classes`; whatever it says does not count where `ignored`.
@@ -34,6 +35,7 @@ class LabelledPicture:
         weight: How often it is drawn in training, relative to others.
         foot_px: (N, 2) ground points: where the middle of each footprint appears (of an excavator the centre of its
             swing), also where it is hidden or outside the picture; NaN where nobody marked it; left out: nowhere.
+        orientation: What makes of the stored picture the one that is marked.
     """
 
     path: Path
@@ -45,6 +47,7 @@ class LabelledPicture:
     source: str
     weight: float = 1.0
     foot_px: FloatArray = field(default_factory=lambda: NO_POINTS)
+    orientation: Orientation = UPRIGHT
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "foot_px", one_point_a_box(self.foot_px, self.xyxy_px))

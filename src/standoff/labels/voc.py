@@ -15,7 +15,9 @@ from typing import Final
 import numpy as np
 
 from standoff.files.plain_text import read_text
-from standoff.labels.pictures import SUFFIXES, first_file, read_size_px
+from standoff.labels.layout_doubts import check_not_extents
+from standoff.labels.pictures import SUFFIXES, canvas_of
+from standoff.labels.places import elsewhere, find_named, first_there
 from standoff.labels.source import BadPicture, SourcePicture, SourceSet, read_each
 from standoff.labels.types import SPLITS, Split
 
@@ -36,6 +38,7 @@ def read_voc(folder: Path) -> SourceSet:
     splits = _read_splits(folder / "ImageSets" / "Main")
     files = sorted((folder / "Annotations").rglob("*.xml"))
     pictures, problems = read_each(files, partial(_read_picture, folder, splits))
+    check_not_extents(pictures, folder)
     labels = sorted({label for picture in pictures for label in picture.labels})
     return SourceSet(tuple(labels), pictures, problems)
 
@@ -52,20 +55,20 @@ def _read_splits(folder: Path) -> dict[str, Split]:
 
 def _read_picture(folder: Path, splits: dict[str, Split], file: Path) -> SourcePicture:
     root = _parse(file)
-    path = _picture_file(folder, root.findtext("filename", "").strip(), file.stem)
-    size_px = read_size_px(path)
-    stated = tuple(_number(root.find("size"), side, file) for side in ("width", "height")) if _has_size(root) else None
-    if stated is not None and stated != size_px:
-        raise BadPicture(path, f"{size_px} pixels where its labels say {stated}", "size differs from labels")
+    name = root.findtext("filename", "").strip()
+    path, reading = _picture_file(folder, name, file.stem)
     objects = root.findall("object")
+    canvas = canvas_of(path, _stated_px(root, file), marked=bool(objects))
     boxes = [[_number(one.find("bndbox"), corner, file) for corner in _CORNERS] for one in objects]
     return SourcePicture(
         path,
-        size_px,
+        canvas.size_px,
         tuple(_label(one, file) for one in objects),
         np.array(boxes, np.float64).reshape(-1, 4) - _TO_EDGES_PX,
         np.array([one.findtext("difficult", "0").strip() == "1" for one in objects], np.bool_),
         splits.get(file.stem),
+        orientation=canvas.orientation,
+        notes=(*elsewhere(path, name, reading), *canvas.notes),
     )
 
 
@@ -76,15 +79,22 @@ def _parse(file: Path) -> ET.Element:
         raise BadPicture(file, f"not XML of labels ({error})", "unreadable labels") from error
 
 
-def _picture_file(folder: Path, name: str, stem: str) -> Path:
-    """Return the picture that the XML names, or one with the XML's own name."""
-    names = ([name] if name else []) + [f"{stem}{suffix}" for suffix in (".jpg", *sorted(SUFFIXES - {".jpg"}))]
-    return first_file([folder / inner / one for inner in _PICTURE_FOLDERS for one in names])
+def _picture_file(folder: Path, name: str, stem: str) -> tuple[Path, str | None]:
+    """Return the picture that the XML names, or one with the XML's own name, and how its name had to be read."""
+    folders = [folder / inner for inner in _PICTURE_FOLDERS]
+    own = [f"{stem}{suffix}" for suffix in (".jpg", *sorted(SUFFIXES - {".jpg"}))]
+    path, reading = find_named(name or own[0], folders)
+    if path.is_file():
+        return path, reading
+    return first_there(one / picture for one in folders for picture in own) or path, None
 
 
-def _has_size(root: ET.Element) -> bool:
-    """Return whether the size is stated: some programs leave it out or write 0."""
-    return root.findtext("size/width", "0").strip() not in ("", "0")
+def _stated_px(root: ET.Element, file: Path) -> tuple[float, float] | None:
+    """Return the size that is stated; None where it is left out or 0, as some programs have it."""
+    if root.findtext("size/width", "0").strip() in ("", "0"):
+        return None
+    size = root.find("size")
+    return _number(size, "width", file), _number(size, "height", file)
 
 
 def _label(one: ET.Element, file: Path) -> str:

@@ -1,12 +1,14 @@
 """YOLO folders: pictures, and beside each a text file of lines `class centre-x centre-y width height`.
 
 The four numbers are shares of the picture, counted from the left and upper *edge* of the first pixel; ours are 0 at
-its centre, half a pixel further. Ground points may lie beside them (see `standoff.labels.ground_points`).
+its centre, half a pixel further. Other lines are read as well (see `standoff.labels.yolo_rows`), and ground points may
+lie beside them (see `standoff.labels.ground_points`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Final
@@ -19,14 +21,44 @@ from standoff.core.homography import FloatArray
 from standoff.files.plain_text import read_text
 from standoff.labels.documents import read_yaml
 from standoff.labels.ground_points import POINTS_FOLDER, in_pixels, read_points
-from standoff.labels.pictures import find_pictures, first_file, read_size_px
-from standoff.labels.source import BadPicture, SourcePicture, SourceSet, read_each, split_named
-from standoff.labels.types import SPLITS, Split
+from standoff.labels.layout_doubts import check_counting, check_not_corners
+from standoff.labels.pictures import Canvas, canvas_of, find_pictures
+from standoff.labels.places import elsewhere, find_named, first_there
+from standoff.labels.source import UNPLACEABLE, BadPicture, SourcePicture, SourceSet, read_each, split_named
+from standoff.labels.types import SPLITS, Problem, Split
+from standoff.labels.yolo_rows import KeypointShape, Unplaceable, read_rows
 
 _NAME_FILES: Final = ("classes.txt", "obj.names", "labels/classes.txt")
-_BOX, _BOX_AND_POINT = 5, 8
-"""Values of a line: class and box; then a keypoint and its visibility."""
-_Listed = tuple[Path, Split | None]
+
+
+@dataclass(frozen=True, slots=True)
+class _Listed:
+    """A picture that a set names.
+
+    Attributes:
+        path: Of the picture.
+        split: Where the set puts it.
+        notes: Where its path is of another computer.
+    """
+
+    path: Path
+    split: Split | None = None
+    notes: tuple[Problem, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class _Meaning:
+    """What the numbers of a set's label files mean.
+
+    Attributes:
+        labels: By class id.
+        keypoints: How many a box has; None: not said.
+        used: Class ids that were met.
+    """
+
+    labels: tuple[str, ...]
+    keypoints: KeypointShape | None = None
+    used: set[float] = field(default_factory=set)
 
 
 def read_yolo_yaml(path: Path, names: Sequence[str] | None) -> SourceSet:
@@ -41,17 +73,26 @@ def read_yolo_yaml(path: Path, names: Sequence[str] | None) -> SourceSet:
     """
     content = read_yaml(path)
     labels = tuple(names) if names is not None else labels_of(content.get("names"), path)
-    root = path.parent / str(content.get("path", "."))
+    meaning = _Meaning(labels, _keypoints(content.get("kpt_shape"), path))
+    root, notes = _root(str(content.get("path") or "."), path)
     listed: list[_Listed] = []
     for key in ("train", "val", "valid", "test"):
         places = content.get(key) or ()
         for place in places if isinstance(places, (list, tuple)) else (places,):
-            listed += [(picture, split_named(key)) for picture in _pictures_at(root, path.parent, str(place), path)]
+            found = _pictures_at((root, path.parent), str(place), path)
+            if found is not None:
+                listed += [replace(one, split=split_named(key)) for one in found[0]]
+                notes += found[1]
+            elif key == "test":  # exports name it whether there is one or not
+                gone = f"'{place}' of {key} is not there"
+                notes.append(Problem(path, gone, "split missing", skipped_picture=False))
+            else:
+                raise _not_there(root, str(place), path)
     if not listed:
         raise DataError(
             expected=f"{', '.join(SPLITS)} in {path}", found="no pictures", fix="name folders or lists of pictures"
         )
-    return _read_listed(listed, labels)
+    return _read_listed(listed, meaning, path, notes)
 
 
 def read_yolo_folder(folder: Path, names: Sequence[str] | None) -> SourceSet:
@@ -64,8 +105,9 @@ def read_yolo_folder(folder: Path, names: Sequence[str] | None) -> SourceSet:
     Raises:
         DataError: No names.
     """
-    listed = [(picture, _split_of(picture.relative_to(folder))) for picture in find_pictures(folder)]
-    return _read_listed(listed, tuple(names) if names is not None else _read_names(folder))
+    listed = [_Listed(picture, _split_of(picture.relative_to(folder))) for picture in find_pictures(folder)]
+    meaning = _Meaning(tuple(names) if names is not None else _read_names(folder))
+    return _read_listed(listed, meaning, folder, [])
 
 
 def labels_of(names: object, path: Path) -> tuple[str, ...]:
@@ -116,61 +158,109 @@ def _read_names(folder: Path) -> tuple[str, ...]:
     )
 
 
-def _pictures_at(root: Path, beside: Path, place: str, path: Path) -> list[Path]:
-    """Return the pictures of a folder, or those that a text file lists."""
-    # Roboflow writes ../train/images for the folder train/images beside the file
-    for candidate in (root / place, root / place.removeprefix("../")):
-        if candidate.is_dir():
-            return find_pictures(candidate)
-        if candidate.is_file():
-            lines = read_text(candidate, "a list of pictures").splitlines()
-            return [_listed_picture(line.strip(), candidate.parent, (root, beside)) for line in lines if line.strip()]
+def _keypoints(shape: object, path: Path) -> KeypointShape | None:
+    if shape is None:
+        return None
+    match shape:
+        case [int(number), 2 | 3 as each] if number > 0:
+            return number, int(each)
     raise DataError(
+        expected=f"`kpt_shape` in {path}: how many keypoints, and 2 or 3 values of each",
+        found=repr(shape),
+        fix="correct it",
+    )
+
+
+def _root(text: str, path: Path) -> tuple[Path, list[Problem]]:
+    """Return the folder that paths in a data.yaml start from: its own where the one that it names is not there."""
+    root, reading = find_named(text, (path.parent,), Path.is_dir)
+    if root.is_dir():
+        return root, list(elsewhere(path, text, reading))
+    return path.parent, list(elsewhere(path, text, "the folder that it is in"))
+
+
+def _pictures_at(roots: tuple[Path, ...], place: str, path: Path) -> tuple[list[_Listed], tuple[Problem, ...]] | None:
+    """Return the pictures of a folder, or those that a text file lists, and a note on where; None without either."""
+    # Roboflow writes ../train/images for the folder train/images beside the file
+    own = first_there((roots[0] / text for text in (place, place.removeprefix("../"))), Path.exists)
+    found, reading = (own, None) if own is not None else find_named(place, roots, Path.exists)
+    if found.is_dir():
+        return [_Listed(picture) for picture in find_pictures(found)], elsewhere(path, place, reading)
+    if found.is_file():
+        lines = read_text(found, "a list of pictures").splitlines()
+        named = [_listed_picture(line.strip(), (found.parent, *roots)) for line in lines if line.strip()]
+        return named, elsewhere(path, place, reading)
+    return None
+
+
+def _not_there(root: Path, place: str, path: Path) -> DataError:
+    return DataError(
         expected=f"the folder or list of pictures '{place}' that {path} names",
         found=f"nothing at {root / place}",
         fix="correct the path",
     )
 
 
-def _listed_picture(line: str, parent: Path, roots: tuple[Path, ...]) -> Path:
-    return first_file([folder / line for folder in (parent, *roots)])
+def _listed_picture(line: str, roots: tuple[Path, ...]) -> _Listed:
+    picture, reading = find_named(line, roots)
+    return _Listed(picture, notes=elsewhere(picture, line, reading))
 
 
 def _split_of(relative: Path) -> Split | None:
     return next((split for part in relative.parts[:-1] if (split := split_named(part))), None)
 
 
-def _read_listed(listed: Sequence[_Listed], labels: tuple[str, ...]) -> SourceSet:
-    pictures, problems = read_each(listed, partial(_read_picture, labels))
-    return SourceSet(labels, pictures, problems)
+def _read_listed(listed: Sequence[_Listed], meaning: _Meaning, source: Path, notes: Sequence[Problem]) -> SourceSet:
+    pictures, problems = read_each(listed, partial(_read_picture, meaning))
+    check_counting(meaning.used, range(len(meaning.labels)), source)
+    check_not_corners(pictures, source, centred=True)
+    return SourceSet(meaning.labels, pictures, [*notes, *problems])
 
 
-def _read_picture(labels: tuple[str, ...], listed: _Listed) -> SourcePicture:
-    path, split = listed
-    size_px = read_size_px(path)
-    numbers, xyxy_px, foot_px = read_boxes(path, size_px)
+def _read_picture(meaning: _Meaning, listed: _Listed) -> SourcePicture:
+    path, labels = listed.path, meaning.labels
+    numbers, xyxy_px, foot_px, canvas = read_boxes(path, meaning.keypoints)
+    meaning.used.update(numbers.tolist())
     unknown = [number for number in numbers if number not in range(len(labels))]
     if unknown:
         raise BadPicture(path, f"class id {unknown[0]:g}, of {len(labels)} classes", "unknown class id")
     names = tuple(labels[int(number)] for number in numbers)
-    return SourcePicture(path, size_px, names, xyxy_px, np.zeros(len(names), np.bool_), split, foot_px=foot_px)
+    return SourcePicture(
+        path,
+        canvas.size_px,
+        names,
+        xyxy_px,
+        np.zeros(len(names), np.bool_),
+        listed.split,
+        foot_px=foot_px,
+        orientation=canvas.orientation,
+        notes=(*listed.notes, *canvas.notes),
+    )
 
 
-def read_boxes(picture: Path, size_px: tuple[int, int]) -> tuple[FloatArray, FloatArray, FloatArray]:
+def read_boxes(
+    picture: Path, keypoints: KeypointShape | None = None
+) -> tuple[FloatArray, FloatArray, FloatArray, Canvas]:
     """Read the label file of a picture, and the ground points beside it.
 
     Args:
         picture: Its labels lie beside it, or in `labels` where it is in `images`.
-        size_px: (width, height) of the picture.
+        keypoints: How many a box has; None: not said.
 
     Returns:
         (N,) class ids as written, (N, 4) boxes and (N, 2) ground points, NaN where none is marked; 0 is the centre of
-        the first pixel.
+        the first pixel; and how the picture lies for them.
 
     Raises:
-        BadPicture: There is no label file, or one of the files holds something else.
+        BadPicture: The picture cannot be read, there is no label file, or one of the files holds something else.
     """
-    rows = _read_rows(_label_file(picture))
+    try:
+        rows = _read_rows(_label_file(picture), keypoints)
+    except BadPicture:
+        canvas_of(picture, None, marked=False)  # whether there is a picture at all comes first
+        raise
+    canvas = canvas_of(picture, None, marked=len(rows) > 0)
+    size_px = canvas.size_px
     points = _sibling(picture, POINTS_FOLDER)
     if points is None or not points.is_file():
         foot_px = in_pixels(rows[:, 5:7], size_px)
@@ -179,15 +269,16 @@ def read_boxes(picture: Path, size_px: tuple[int, int]) -> tuple[FloatArray, Flo
             foot_px = read_points(points, len(rows), size_px)
         except ValueError as error:
             raise BadPicture(points, str(error), "unreadable labels") from error
-    return rows[:, 0], _to_corners(rows[:, 1:5], size_px), foot_px
+    return rows[:, 0], _to_corners(rows[:, 1:5], size_px), foot_px, canvas
 
 
 def _label_file(picture: Path) -> Path:
     """Return the label file: in `labels` where the picture is in `images`, else beside it."""
     apart = _sibling(picture, "labels")
-    file = first_file([*([apart] if apart else []), picture.with_suffix(".txt")])
-    if not file.is_file():
-        raise BadPicture(picture, f"no label file at {file}", "label file missing")
+    places = [*([apart] if apart else []), picture.with_suffix(".txt")]
+    file = first_there(places)
+    if file is None:
+        raise BadPicture(picture, f"no label file at {places[0]}", "label file missing")
     return file
 
 
@@ -200,25 +291,18 @@ def _sibling(picture: Path, folder: str) -> Path | None:
     return Path(*parts[:last], folder, *parts[last + 1 :]).with_suffix(".txt")
 
 
-def _read_rows(path: Path) -> FloatArray:
+def _read_rows(path: Path, keypoints: KeypointShape | None) -> FloatArray:
     """Return (N, 7) numbers of a label file, the last two NaN where no point is marked; an empty file has none."""
     try:
-        lines = [line.split() for line in read_text(path, "labels").splitlines()]
+        text = read_text(path, "labels")
     except DataError as error:
         raise BadPicture(path, f"no text ({error.found})", "unreadable labels") from error
-    rows = [row for row in lines if row]
-    wrong = [len(row) for row in rows if len(row) not in (_BOX, _BOX_AND_POINT)]
-    if wrong:
-        raise BadPicture(path, f"a line of {wrong[0]} values instead of 5", "unreadable labels")
-    padded = [row if len(row) == _BOX_AND_POINT else [*row, "0", "0", "0"] for row in rows]
     try:
-        numbers = np.array(padded, dtype=np.float64).reshape(-1, _BOX_AND_POINT)
+        return read_rows(text, keypoints)
+    except Unplaceable as error:
+        raise BadPicture(path, str(error), UNPLACEABLE) from error
     except ValueError as error:
-        raise BadPicture(path, f"not a number ({error})", "unreadable labels") from error
-    if not np.isfinite(numbers).all():
-        raise BadPicture(path, "a number that is not finite", "unreadable labels")
-    numbers[numbers[:, 7] == 0.0, 5:7] = np.nan
-    return numbers[:, :7]
+        raise BadPicture(path, str(error), "unreadable labels") from error
 
 
 def _to_corners(shares: FloatArray, size_px: tuple[int, int]) -> FloatArray:

@@ -18,7 +18,7 @@ from standoff.core.types import IntArray
 from standoff.files.yaml_text import read_yaml
 from standoff.labels.documents import check_types, resolve_path
 from standoff.labels.mixture import IGNORE
-from standoff.labels.pictures import find_pictures, read_size_px
+from standoff.labels.pictures import canvas_of, find_pictures
 from standoff.labels.regions import corners_of, read_regions
 from standoff.labels.source import BadPicture
 from standoff.labels.splits import flight_of
@@ -176,6 +176,8 @@ def _background(
             expected="`ignore_px` as [[x1, y1, x2, y2], ...]", found=f"{entry['ignore_px']}", fix="correct it"
         )
     ignored_px = np.concatenate([ignored_px, regions_px])
+    if len(ignored_px):
+        _check_as_stored(path)
     px_per_m = entry.get("px_per_m")
     if entry.get("labels"):
         boxes_px, names = _read_labels(path, entry["labels"])
@@ -190,10 +192,22 @@ def _background(
     return Background(path, group, entry["pitch_deg"], px_per_m, light, shadow_deg, xyxy_px, ids, ignored_px)
 
 
+def _check_as_stored(path: Path) -> None:
+    """Refuse a photograph that EXIF data turn: its regions may be of the stored one or of the upright one."""
+    try:
+        canvas_of(path, None, marked=True)
+    except BadPicture as error:
+        raise DataError(
+            expected=f"a photograph that is upright as stored, for its regions, at {path}",
+            found=error.problem.found,
+            fix="save it upright and mark it again",
+        ) from error
+
+
 def _read_labels(path: Path, names: Mapping[int, str]) -> tuple[FloatArray, list[str]]:
     """Return the boxes (N, 4) of a photograph's YOLO label file, and what each is."""
     try:
-        numbers, xyxy_px, _ = read_boxes(path, read_size_px(path))
+        numbers, xyxy_px, _, _ = read_boxes(path)
     except BadPicture as error:
         raise DataError(
             expected=f"a photograph with labels in {path}", found=str(error), fix="check the folder"

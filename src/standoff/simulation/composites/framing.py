@@ -12,11 +12,10 @@ import numpy as np
 import shapely
 
 from standoff.core.camera import Camera
-from standoff.core.errors import DataError
 from standoff.core.homography import BoolArray, FloatArray, apply, invert
 from standoff.core.pose import View
 from standoff.core.types import ImageArray, IntArray
-from standoff.files.lfs import refuse_pointer
+from standoff.labels.pictures import load_upright
 from standoff.simulation.composites.backgrounds import Background
 from standoff.simulation.flight import Still
 from standoff.simulation.mesh import Float32Array
@@ -76,10 +75,7 @@ def frame(rng: np.random.Generator, background: Background, size_px: tuple[int, 
     Raises:
         DataError: The file is not a picture.
     """
-    photo = cv2.imread(str(background.path), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
-    if photo is None:
-        refuse_pointer(background.path, f"a photograph in {background.path}", DataError)
-        raise DataError(expected="a photograph", found=f"{background.path}", fix="remove it from the backgrounds")
+    photo = load_upright(background.path)
     if rng.random() < 0.5:
         photo, background = _mirrored(photo, background)
     photographed = _photograph_view(rng, background, photo.shape[1], photo.shape[0])

@@ -17,7 +17,7 @@ from standoff.stages.frames.album import read_album
 from standoff.stages.frames.fingerprint import fingerprint
 from standoff.stages.frames.orientation import UPRIGHT, Orientation
 from standoff.stages.frames.photograph import read_photograph
-from standoff.stages.frames.picture_header import PictureHeader, UnreadablePicture, read_header
+from standoff.stages.frames.picture_header import PictureHeader, UnreadablePicture, read_whole_header
 from standoff.stages.frames.pictures import AvPicture, Scaler
 from standoff.stages.frames.reader import Selection, Shot, check_size, size_changed
 
@@ -86,7 +86,7 @@ def _checked_headers(paths: Sequence[Path]) -> list[PictureHeader]:
     unreadable: list[str] = []
     for path in paths:
         try:
-            headers.append(read_header(path))
+            headers.append(read_whole_header(path))
         except (UnreadablePicture, FileNotFoundError) as error:
             unreadable.append(f"{path.name}: {error}")
     if unreadable:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import struct
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO, Final
@@ -18,6 +19,20 @@ _JPEG_START, _JPEG_SCAN, _JPEG_END = b"\xff\xd8", b"\xff\xda", b"\xff\xd9"
 _PNG_HEAD_BYTES: Final = 8
 _TIFF_OFFSETS: Final = ((273, 279), (324, 325))
 """Tags of where the strips or tiles begin and of their lengths."""
+
+
+_DAMAGED: Final = (
+    OSError,
+    ValueError,
+    SyntaxError,
+    KeyError,
+    IndexError,
+    TypeError,
+    OverflowError,
+    struct.error,
+    Image.DecompressionBombError,
+)
+"""What Pillow raises of files that are not as they should be."""
 
 
 class UnreadablePicture(ValueError):
@@ -45,6 +60,17 @@ class PictureHeader:
 
 
 def read_header(path: Path) -> PictureHeader:
+    """Read a picture's header.
+
+    Raises:
+        UnreadablePicture: It is no picture.
+        FileNotFoundError: There is no such file.
+    """
+    with _opened(path) as (picture, file):
+        return _header(picture, file)
+
+
+def read_whole_header(path: Path) -> PictureHeader:
     """Read a picture's header, and check that the file does not end before the picture does.
 
     Of JPEG, PNG, WebP, BMP and TIFF files; decoders fill up what is missing without a word.
@@ -53,23 +79,28 @@ def read_header(path: Path) -> PictureHeader:
         UnreadablePicture: It is no picture, or not a whole one.
         FileNotFoundError: There is no such file.
     """
+    with _opened(path) as (picture, file):
+        header = _header(picture, file)
+        if not _IS_WHOLE.get(header.file_format, _any)(picture, file):
+            raise UnreadablePicture("its end is missing")
+        return header
+
+
+@contextmanager
+def _opened(path: Path) -> Generator[tuple[Image.Image, BinaryIO], None, None]:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of damaged EXIF data, without which the picture is as good
             with path.open("rb") as file, Image.open(file) as picture:
-                header = _header(picture, file)
-                is_whole = _IS_WHOLE.get(header.file_format, _any)(picture, file)
-    except FileNotFoundError:
+                yield picture, file
+    except (FileNotFoundError, UnreadablePicture):
         raise
     except UnidentifiedImageError as error:
         if is_pointer(path):
             raise UnreadablePicture(f"it is {POINTER}: {FETCH}") from error
         raise UnreadablePicture("it is of no known format" if path.stat().st_size else "it is empty") from error
-    except (OSError, ValueError, SyntaxError, KeyError, TypeError, struct.error, Image.DecompressionBombError) as error:
+    except _DAMAGED as error:
         raise UnreadablePicture(str(getattr(error, "strerror", None) or error) or type(error).__name__) from error
-    if not is_whole:
-        raise UnreadablePicture("its end is missing")
-    return header
 
 
 def _header(picture: Image.Image, file: BinaryIO) -> PictureHeader:
@@ -77,14 +108,19 @@ def _header(picture: Image.Image, file: BinaryIO) -> PictureHeader:
         tags: Mapping[int, int] = picture.tag_v2  # type: ignore[attr-defined]
         stored_px = int(tags[ExifTags.Base.ImageWidth]), int(tags[ExifTags.Base.ImageLength])
         return PictureHeader(stored_px, Orientation.of_exif(tags.get(ExifTags.Base.Orientation)), "TIFF")
-    if picture.format == "PNG" and "exif" not in picture.info:  # for its EXIF data Pillow would decode all pixels
-        exif = Image.Exif()
+    return PictureHeader(picture.size, Orientation.of_exif(_exif_orientation(picture, file)), str(picture.format or ""))
+
+
+def _exif_orientation(picture: Image.Image, file: BinaryIO) -> object:
+    """Return EXIF's number; None where there is none, or where the data are damaged, as for every viewer."""
+    try:
+        if picture.format != "PNG" or "exif" in picture.info:
+            return picture.getexif().get(ExifTags.Base.Orientation)
+        exif = Image.Exif()  # for which Pillow would decode all pixels of a PNG
         exif.load(dict(_png_chunks(file)).get(b"eXIf", b""))
-    else:
-        exif = picture.getexif()
-    return PictureHeader(
-        picture.size, Orientation.of_exif(exif.get(ExifTags.Base.Orientation)), str(picture.format or "")
-    )
+        return exif.get(ExifTags.Base.Orientation)
+    except _DAMAGED:
+        return None
 
 
 def _jpeg_is_whole(picture: Image.Image, file: BinaryIO) -> bool:

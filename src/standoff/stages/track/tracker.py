@@ -76,6 +76,7 @@ class Tracker:
     >>> tracker = Tracker()
     >>> box = np.array([[10.0, 10.0, 20.0, 40.0]])
     >>> still = NoCameraMotion("not estimated")
+    >>> from standoff.core.types import NoGroundMap
     >>> unmapped = NoGroundMap("no reference")
     >>> tracker.update(0.0, Detections(box, np.array([0.9]), np.array([0])), still, unmapped).track_id
     array([1])
