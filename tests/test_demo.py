@@ -93,9 +93,8 @@ def test_the_film_can_be_rendered_again(film: Clip) -> None:
                 assert places_m[entity_id] == pytest.approx(xy_m, abs=SCENE_DISTANCE_M)
 
 
-@pytest.mark.parametrize(
-    "every", [25, pytest.param(12, marks=pytest.mark.live), pytest.param(5, marks=pytest.mark.live)]
-)
+@pytest.mark.live
+@pytest.mark.parametrize("every", [25, 12, 5])
 def test_the_films_danger_is_recognised_at_few_frames_a_second(every: int, tmp_path: Path) -> None:
     settings = load_settings(FILM / "reference.yaml", {"every": every, "outputs": ()})
     events = [event for result in open_run(FILM / "video.mp4", tmp_path / "out", settings) for event in result.hazards]
