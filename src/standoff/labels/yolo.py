@@ -296,7 +296,7 @@ def _sibling(picture: Path, folder: str) -> Path | None:
 def _read_rows(path: Path, keypoints: KeypointShape | None) -> FloatArray:
     """Return (N, 7) numbers of a label file, the last two NaN where no point is marked; an empty file has none."""
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = path.read_bytes().decode("utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise BadPicture(path, f"no text ({error})", "unreadable labels") from error
     try:
