@@ -13,7 +13,7 @@ TEST = "test"
 FUZZ = "fuzz"
 EXAMPLES = 100
 """Of a law that does not say how many it is worth."""
-FUZZ_TIMES = 20
+FUZZ_TIMES = 30
 """As many examples in the open search."""
 
 

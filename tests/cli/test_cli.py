@@ -78,6 +78,25 @@ def test_a_run_writes_every_output_and_finds_the_hazard(call: Call, video: Path,
     assert record["settings"]["locate"]["radius_m"] == {"worker": 1.0, "excavator": 3.0}
 
 
+def test_what_is_lost_of_a_film_while_it_is_read_is_told_at_the_end_and_in_the_record(
+    call: Call, video: Path, site: Path, tmp_path: Path
+) -> None:
+    double = tmp_path / "double.mkv"
+    with av.open(str(video)) as source, av.open(str(double), "w") as target:
+        stream = target.add_stream_from_template(source.streams.video[0])
+        for number, packet in enumerate(packet for packet in source.demux(video=0) if packet.dts is not None):
+            if number == 20:
+                packet.pts, packet.dts = packet.pts - packet.duration, packet.dts - packet.duration
+            packet.stream = stream
+            target.mux_one(packet)
+    code, _, err = call("run", double, "--config", site, "--outputs", "frames", "--out", tmp_path / "out")
+    record = json.loads((tmp_path / "out" / "run.json").read_text(encoding="utf-8"))
+    warning = "double.mkv: 1 frame is skipped, of a time that is not later (1.900 s after 1.900 s at frame 20)"
+    assert (code, err) == (0, f"standoff: warning: {warning}\n")
+    assert record["warnings"] == [warning]
+    assert (record["source"]["skipped_frames"], record["counts"]["frames"]) == (1, 33)
+
+
 def test_the_record_says_which_telemetry_was_used_and_where_it_does_not_fit(
     call: Call, video: Path, site: Path, tmp_path: Path
 ) -> None:

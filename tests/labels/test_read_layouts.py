@@ -219,6 +219,7 @@ def test_voc_counts_pixels_from_one_and_difficult_objects_are_ignored(tmp_path: 
     "xml",
     [
         '<!DOCTYPE a [<!ENTITY b "bbbb">]><annotation><filename>&b;</filename></annotation>',
+        '<?xml version="1.0" encoding="nonsense"?><annotation></annotation>',
         "<annotation><object>",
         "",
         _voc_xml("2.png", _voc_object("car", (1, 1, "many", 5))),

@@ -18,6 +18,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet
 
+from standoff.clips.columns import column_names
 from standoff.core.boxes import unknown_points
 from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.errors import DataError
@@ -192,7 +193,7 @@ def _about(schema: pa.Schema, file: Path) -> dict[str, Any]:
 
 def _column(table: pa.Table, name: str, kind: pa.DataType, file: Path) -> Any:  # noqa: ANN401 - of any dtype
     """Return a column without nulls as an array."""
-    if name not in table.column_names:
+    if name not in column_names(table):
         found = f"{file} without {name}"
         raise DataError(expected=f"the columns of {DETECTIONS_FILE}", found=found, fix=_RECORD_AGAIN)
     column = table.column(name)
@@ -207,7 +208,8 @@ def _column(table: pa.Table, name: str, kind: pa.DataType, file: Path) -> Any:  
 
 def _seen(table: pa.Table, file: Path) -> BoolArray:
     """Return which rows hold a detection; the others stand for a frame without any."""
-    missing = [name for name, *_ in _BOX if name not in table.column_names]
+    present = column_names(table)
+    missing = [name for name, *_ in _BOX if name not in present]
     if missing:
         found = f"{file} without {', '.join(missing)}"
         raise DataError(expected=f"the columns of {DETECTIONS_FILE}", found=found, fix=_RECORD_AGAIN)
@@ -256,7 +258,7 @@ def _detections(table: pa.Table, file: Path) -> Detections:
 def _feet(table: pa.Table, file: Path) -> tuple[FloatArray, FloatArray]:
     """Return (N, 2) ground points and (N, 2, 2) covariances; NaN where there is none."""
     names = [name for name, *_ in FOOT_COLUMNS]
-    if not set(names) <= set(table.column_names):
+    if not set(names) <= column_names(table):
         return unknown_points(len(table)), np.full((len(table), 2, 2), np.nan)
     try:
         columns = [table.column(name).cast(pa.float64()).fill_null(np.nan).to_numpy() for name in names]

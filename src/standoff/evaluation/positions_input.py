@@ -12,6 +12,7 @@ import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet
 
+from standoff.clips.columns import column_names
 from standoff.core.errors import DataError
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import IntArray
@@ -72,7 +73,8 @@ def read_run_table(path: Path, names: tuple[str, ...]) -> Columns:
 
 
 def _columns(table: pa.Table, names: tuple[str, ...], path: Path | str) -> Columns:
-    missing = [name for name in names if name not in table.column_names]
+    present = column_names(table)
+    missing = [name for name in names if name not in present]
     if missing:
         raise DataError(
             expected=f"the columns {','.join(names)}",

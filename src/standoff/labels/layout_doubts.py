@@ -14,6 +14,7 @@ from standoff.labels.source import SourcePicture
 
 _SLACK: Final = 0.02
 """Of the picture's sides; boxes of any layout stick out by so much."""
+_LARGEST_ID: Final = 1e9
 
 
 def check_not_corners(pictures: Sequence[SourcePicture], source: Path, *, centred: bool) -> None:
@@ -58,8 +59,7 @@ def check_counting(used: Collection[object], known: Collection[object], source: 
     Raises:
         DataError: One beyond either end is used, and the last one at the other end is not.
     """
-    ids = sorted(number for number in used if isinstance(number, (int, float)))
-    of_labels = sorted(number for number in known if isinstance(number, (int, float)))
+    ids, of_labels = _numbers(used), _numbers(known)
     if not ids or not of_labels or set(ids) <= set(of_labels):
         return
     first, last = of_labels[0], of_labels[-1]
@@ -71,6 +71,10 @@ def check_counting(used: Collection[object], known: Collection[object], source: 
             found=f"{ids[0]:g} to {ids[-1]:g}, as if they were counted from another number",
             fix="correct the ids, or add a label for the one that is not used",
         )
+
+
+def _numbers(ids: Collection[object]) -> list[float]:
+    return sorted(number for number in ids if isinstance(number, (int, float)) and abs(number) < _LARGEST_ID)
 
 
 def _all_boxes(pictures: Sequence[SourcePicture]) -> tuple[FloatArray, FloatArray]:

@@ -75,7 +75,7 @@ def _read_picture(folder: Path, splits: dict[str, Split], file: Path) -> SourceP
 def _parse(file: Path) -> ET.Element:
     try:
         return ET.fromstring(file.read_bytes(), parser=ET.XMLParser(target=_NoDoctype()))
-    except (OSError, ET.ParseError, ValueError) as error:
+    except (OSError, ET.ParseError, ValueError, LookupError) as error:  # the last for encodings
         raise BadPicture(file, f"not XML of labels ({error})", "unreadable labels") from error
 
 

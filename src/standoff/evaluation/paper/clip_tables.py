@@ -7,6 +7,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet
 
+from standoff.clips.columns import column_names
 from standoff.core.errors import DataError
 from standoff.evaluation.positions_input import Columns
 
@@ -30,7 +31,8 @@ def read_table(path: Path, names: tuple[str, ...]) -> Columns:
         table = pyarrow.parquet.read_table(path)
     except (OSError, pa.ArrowException) as error:
         raise DataError(expected=f"a whole Parquet table in {path}", found=str(error), fix=fix) from error
-    missing = [name for name in names if name not in table.column_names]
+    present = column_names(table)
+    missing = [name for name in names if name not in present]
     if missing:
         raise DataError(expected=f"the columns {','.join(names)}", found=f"{path} without {','.join(missing)}", fix=fix)
     return {name: table.column(name).to_numpy() for name in names}

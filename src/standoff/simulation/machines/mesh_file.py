@@ -39,7 +39,7 @@ _CELLS_M = (1e-4, 0.015, 0.02, 0.03, 0.04, 0.055, 0.075, 0.1, 0.14, 0.2)
 _PAINT_HUE = (6, 28)
 """OpenCV's hue, 0..179: red-orange to yellow."""
 _UNREADABLE = (
-    ValueError, KeyError, IndexError, TypeError, AttributeError, OSError, ParseError, json.JSONDecodeError,
+    ValueError, LookupError, TypeError, AttributeError, OSError, ParseError, json.JSONDecodeError,
     collada.common.DaeError,
 )  # fmt: skip
 
