@@ -21,8 +21,8 @@ from laws import few
 from pages import PageReader
 
 from standoff.core.errors import GroundError
-from standoff.core.protocols import AnyGround, AnyMotion
-from standoff.core.types import Detections, Frame, NoGroundMap, Tracks
+from standoff.core.protocols import AnyMotion
+from standoff.core.types import Detections, Frame, NoGroundMap
 
 OUTPUTS = {
     "run.json", "tracks.parquet", "proximity.parquet", "frames.parquet", "detections.parquet", "hazards.jsonl",
@@ -404,32 +404,3 @@ def test_an_interrupted_run_leaves_whole_files_that_say_so(
         assert sum(1 for _ in container.decode(video=0)) == record["counts"]["frames"]
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert "interrupted" in PageReader.of(page).text
-
-
-class BlindTracker:
-    """A tracker that follows nobody."""
-
-    def update(self, time_s: float, detections: Detections, motion: AnyMotion, ground: AnyGround) -> Tracks:
-        return Tracks.empty()
-
-    def coast(self, time_s: float, motion: AnyMotion) -> Tracks:
-        return Tracks.empty()
-
-
-def test_what_the_detector_is_sure_of_and_no_track_shows_is_said_everywhere(
-    call: Call, video: Path, site: Path, tmp_path: Path
-) -> None:
-    settings = yaml.safe_load(site.read_text())
-    settings["replace"] = settings.get("replace", {}) | {"track": {"factory": "cli.test_cli:BlindTracker"}}
-    site.write_text(yaml.safe_dump(settings), encoding="utf-8")
-    code, _, err = call("run", video, "--config", site, "--out", tmp_path / "out", "--quiet", "--outputs", "hazards")
-    assert code == 1
-    assert "warning: 68 of 68 sure detections are in no track" in err
-    record = json.loads((tmp_path / "out" / "run.json").read_text())
-    assert record["counts"]["sure_detections"] == record["counts"]["unfollowed_detections"] == 68
-    assert any("68 of 68" in warning for warning in record["warnings"])
-    events = [json.loads(line) for line in (tmp_path / "out" / "hazards.jsonl").read_text().splitlines()]
-    assert [(event["rule"], event["phase"]) for event in events] == [
-        ("measurement", "opened"),
-        ("measurement", "closed"),
-    ]

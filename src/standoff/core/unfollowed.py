@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from standoff.core.boxes import overlaps
-from standoff.core.classes import CLASSES, Role
 from standoff.core.homography import BoolArray
+from standoff.core.roles import REFERENCE_ROLE, ROLE_OF_CLASS
 from standoff.core.types import Detections, Tracks
 
 SURE_SCORE = 0.6
 """Clutter rarely reaches it."""
 
-_ROLE = np.array([list(Role).index(site_class.role) for site_class in CLASSES])
-_REFERENCE = list(Role).index(Role.REFERENCE)
 _SAME_THING = 0.25
 """Overlap (IoU) of a track's box, which may be filtered, with the detection that it follows."""
 
@@ -31,12 +27,13 @@ def unfollowed(detections: Detections, tracks: Tracks, least_score: float = SURE
     Returns:
         (K,) for each sure detection of a person or a machine.
 
+    >>> import numpy as np
     >>> box, one = np.array([[10.0, 10.0, 20.0, 40.0]]), np.zeros(1, dtype=np.int64)
     >>> unfollowed(Detections(box, np.array([0.9]), one), Tracks.empty())
     array([ True])
     """
-    sure = detections[(detections.score >= least_score) & (_ROLE[detections.class_id] != _REFERENCE)]
-    same_role = _ROLE[sure.class_id][:, None] == _ROLE[tracks.class_id]
+    sure = detections[(detections.score >= least_score) & (ROLE_OF_CLASS[detections.class_id] != REFERENCE_ROLE)]
+    same_role = ROLE_OF_CLASS[sure.class_id][:, None] == ROLE_OF_CLASS[tracks.class_id]
     followed = same_role & (overlaps(sure.xyxy_px, tracks.xyxy_px) >= _SAME_THING)
     lost: BoolArray = ~followed.any(axis=1)
     return lost

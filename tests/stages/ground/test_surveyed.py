@@ -2,17 +2,11 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from laws import examples
-from mutations import mutated
 from tolerances import GROUND_THROUGH_LENS_M, SURVEY_COVERAGE, SURVEY_SIGMA_REL
 
 from standoff.core import homography
@@ -21,15 +15,13 @@ from standoff.core.errors import GroundError
 from standoff.core.homography import FloatArray
 from standoff.core.types import Detections, Frame, GroundMap, ImageArray, Luma, NoCameraMotion, NoGroundMap
 from standoff.stages.frames.pictures import halved
-from standoff.stages.ground.geographic import east_north_m
-from standoff.stages.ground.survey_file import load_survey
 from standoff.stages.ground.surveyed import SurveyedGround
 
 STILL = NoCameraMotion("not estimated")
 
 _SIZE = (1280, 720)
 _MATRIX = np.array([[1000.0, 0, 640.0], [0, 1000.0, 360.0], [0, 0, 1]])
-_LENS = Camera(1280, 720, _MATRIX, np.array([-0.25, 0.06, 0.001, -0.0005, 0.01]))
+LENS = Camera(1280, 720, _MATRIX, np.array([-0.25, 0.06, 0.001, -0.0005, 0.01]))
 _PLAIN_LENS = Camera(1280, 720, _MATRIX, np.zeros(5))
 _POINTS_M = np.array([[-6.0, 14], [6, 14], [8, 32], [-9, 30], [0, 20], [3, 26], [-4, 24], [5, 18]])
 _PAIR_M = np.array([[-2.0, 17.0], [4.0, 27.0]])
@@ -86,7 +78,7 @@ def refusal(*arguments: Any, **keywords: Any) -> str:
 
 
 @pytest.mark.parametrize("count", [4, 5, 8])
-@pytest.mark.parametrize("camera", [_PLAIN_LENS, _LENS], ids=["pinhole", "lens"])
+@pytest.mark.parametrize("camera", [_PLAIN_LENS, LENS], ids=["pinhole", "lens"])
 def test_exact_points_give_the_exact_map(count: int, camera: Camera) -> None:
     points_m = _POINTS_M[:count]
     ground = SurveyedGround(seen(points_m, camera), points_m, _SIZE, camera=camera)
@@ -99,8 +91,8 @@ def test_exact_points_give_the_exact_map(count: int, camera: Camera) -> None:
 
 
 def test_forgetting_the_lens_shows_in_the_residuals() -> None:
-    with_lens = SurveyedGround(seen(_POINTS_M, _LENS), _POINTS_M, _SIZE, camera=_LENS)
-    without = SurveyedGround(seen(_POINTS_M, _LENS), _POINTS_M, _SIZE)
+    with_lens = SurveyedGround(seen(_POINTS_M, LENS), _POINTS_M, _SIZE, camera=LENS)
+    without = SurveyedGround(seen(_POINTS_M, LENS), _POINTS_M, _SIZE)
     assert without.description["rms_px"] > 100 * with_lens.description["rms_px"]
     assert without.description["lens_distortion_removed"] is False
 
@@ -206,10 +198,10 @@ def test_the_scale_is_metres_per_pixel_at_the_middle_of_the_points() -> None:
 
 
 def test_every_frame_gets_the_same_map() -> None:
-    ground = SurveyedGround(seen(_POINTS_M, _LENS), _POINTS_M, _SIZE, camera=_LENS)
+    ground = SurveyedGround(seen(_POINTS_M, LENS), _POINTS_M, _SIZE, camera=LENS)
     maps = [ground.update(blank_frame(*_SIZE, index), Detections.empty(), STILL) for index in range(3)]
     assert all(one is maps[0] for one in maps)
-    np.testing.assert_array_equal(updated(ground).anchors_px, seen(_POINTS_M, _LENS))
+    np.testing.assert_array_equal(updated(ground).anchors_px, seen(_POINTS_M, LENS))
     assert updated(ground).method == "surveyed"
     assert updated(ground).age_s == 0.0
 
@@ -217,8 +209,8 @@ def test_every_frame_gets_the_same_map() -> None:
 @pytest.mark.parametrize("factor", [0.5, 3.0])
 def test_a_frame_of_another_size_gets_the_map_scaled_to_it(factor: float) -> None:
     area_px = [[100, 300], [1200, 300], [1200, 700], [100, 700]]
-    ground = SurveyedGround(seen(_POINTS_M, _LENS), _POINTS_M, _SIZE, camera=_LENS, area_px=area_px)
-    pair_px = seen(_PAIR_M, _LENS)
+    ground = SurveyedGround(seen(_POINTS_M, LENS), _POINTS_M, _SIZE, camera=LENS, area_px=area_px)
+    pair_px = seen(_PAIR_M, LENS)
     resized_px = (pair_px + 0.5) * factor - 0.5
     surveyed, scaled = updated(ground), updated(ground, int(_SIZE[0] * factor), int(_SIZE[1] * factor))
     np.testing.assert_allclose(scaled.to_ground(resized_px)[0], surveyed.to_ground(pair_px)[0], atol=1e-7)
@@ -230,16 +222,16 @@ def test_a_frame_of_another_size_gets_the_map_scaled_to_it(factor: float) -> Non
 
 
 def test_a_frame_of_another_shape_has_no_map() -> None:
-    ground = SurveyedGround(seen(_POINTS_M, _LENS), _POINTS_M, _SIZE)
+    ground = SurveyedGround(seen(_POINTS_M, LENS), _POINTS_M, _SIZE)
     result = ground.update(blank_frame(1280, 960), Detections.empty(), STILL)
     assert isinstance(result, NoGroundMap)
     assert result.reason == "picture size differs from the survey"
 
 
 def test_the_camera_may_be_calibrated_at_another_size() -> None:
-    double = _LENS.scaled_to(2560, 1440)
-    points_px = seen(_POINTS_M, _LENS)
-    one, other = (SurveyedGround(points_px, _POINTS_M, _SIZE, camera=camera) for camera in (_LENS, double))
+    double = LENS.scaled_to(2560, 1440)
+    points_px = seen(_POINTS_M, LENS)
+    one, other = (SurveyedGround(points_px, _POINTS_M, _SIZE, camera=camera) for camera in (LENS, double))
     np.testing.assert_allclose(one.fit.image_to_ground, other.fit.image_to_ground, rtol=1e-9)
 
 
@@ -247,9 +239,9 @@ def test_the_trusted_area_bends_with_the_lens() -> None:
     area_px = np.array([[10.0, 300.0], [1270.0, 300.0], [1270.0, 710.0], [10.0, 710.0]])
     plain = updated(SurveyedGround(seen(_POINTS_M, _PLAIN_LENS), _POINTS_M, _SIZE, area_px=area_px))
     np.testing.assert_array_equal(plain.valid_px, area_px)
-    bent = updated(SurveyedGround(seen(_POINTS_M, _LENS), _POINTS_M, _SIZE, camera=_LENS, area_px=area_px))
+    bent = updated(SurveyedGround(seen(_POINTS_M, LENS), _POINTS_M, _SIZE, camera=LENS, area_px=area_px))
     assert len(bent.valid_px) > len(area_px)
-    outline_px = _LENS.distort(bent.valid_px)
+    outline_px = LENS.distort(bent.valid_px)
     on_side = np.abs(outline_px[:, :, None] - [[[10.0, 1270.0], [300.0, 710.0]]]).min(axis=(1, 2))
     assert on_side.max() < 1e-6
 
@@ -294,130 +286,6 @@ def test_other_wrong_arguments_are_refused_in_one_line() -> None:
     assert "positive point_sigma_px" in refusal(_SQUARE_PX, _SQUARE_M, _SIZE, point_sigma_px=0.0)
     assert "one name a point" in refusal(_SQUARE_PX, _SQUARE_M, _SIZE, names=("a",))
     assert "area_px" in refusal(_SQUARE_PX, _SQUARE_M, _SIZE, area_px=[[1, 2], [3, 4]])
-    assert "aspect ratio" in refusal(_SQUARE_PX, _SQUARE_M, (640, 480), camera=_LENS)
-    blind = Camera(1280, 720, _LENS.matrix, np.array([-3.0, 0, 0, 0, 0]))
+    assert "aspect ratio" in refusal(_SQUARE_PX, _SQUARE_M, (640, 480), camera=LENS)
+    blind = Camera(1280, 720, LENS.matrix, np.array([-3.0, 0, 0, 0, 0]))
     assert "distortion has no inverse" in refusal(_SQUARE_PX, _SQUARE_M, _SIZE, camera=blind)
-
-
-_SURVEY = """
-image_size_px: [1280, 720]
-points:
-  - {name: kerb, px: [100, 100], m: [0, 3]}
-  - {name: manhole, px: [500, 100], m: [4, 3]}
-  - {px: [500, 400], m: [4, 0]}
-  - {px: [100, 400], m: [0, 0]}
-"""
-
-
-def survey_file(folder: Path, text: str) -> Path:
-    path = folder / "survey.yaml"
-    path.write_text(text, encoding="utf-8")
-    return path
-
-
-def test_a_survey_file_gives_the_map_of_its_points(tmp_path: Path) -> None:
-    ground = load_survey(survey_file(tmp_path, _SURVEY))
-    mapped, _ = updated(ground).to_ground(np.array([[300.0, 250.0]]))
-    np.testing.assert_allclose(mapped, [[2.0, 1.5]], atol=1e-9)
-    assert [row["name"] for row in ground.description["points"]] == ["kerb", "manhole", "point 3", "point 4"]
-
-
-def test_a_survey_files_camera_is_found_beside_it_and_can_be_replaced(tmp_path: Path) -> None:
-    (tmp_path / "lens.yaml").write_text(
-        "{width_px: 1280, height_px: 720, fx: 1000, fy: 1000, cx: 640, cy: 360, k1: -0.2}"
-    )
-    extra = "camera: lens.yaml\narea_px: [[0, 0], [1279, 0], [640, 719]]\npoint_sigma_px: 2.5\n"
-    ground = load_survey(survey_file(tmp_path, _SURVEY + extra))
-    camera = updated(ground).camera
-    assert camera is not None
-    assert camera.distortion[0] == -0.2
-    assert ground.fit.sigma_px == pytest.approx(2.5)
-    assert len(updated(ground).valid_px) > 3
-    replaced = updated(load_survey(survey_file(tmp_path, _SURVEY + extra), camera=_LENS)).camera
-    assert replaced is not None
-    assert replaced.distortion[0] == -0.25
-
-
-def geographic_survey(key: str, offset_deg: tuple[float, float], span_deg: float) -> str:
-    """Write the four points as degrees."""
-    rows = [
-        f"  - {{px: [{x}, {y}], {key}: [{offset_deg[0] + span_deg * a:.9f}, {offset_deg[1] + span_deg * b:.9f}]}}"
-        for x, y, a, b in ((100, 100, 0, 3), (500, 100, 4, 3), (500, 400, 4, 0), (100, 400, 0, 0))
-    ]
-    return "image_size_px: [1280, 720]\npoints:\n" + "\n".join(rows) + "\n"
-
-
-@given(longitude=st.floats(-180, 180), latitude=st.floats(-75, 75))
-@examples(30)
-def test_degrees_become_metres_as_the_ellipsoid_says(longitude: float, latitude: float) -> None:
-    found_m = east_north_m(np.array([[longitude, latitude], [longitude + 0.002, latitude + 0.001]]))
-    # From the ellipsoid in space: the chord between the two places.
-    places = []
-    for lon, lat in ((longitude, latitude), (longitude + 0.002, latitude + 0.001)):
-        east, north = np.deg2rad([lon, lat])
-        radius_m = 6378137.0 / np.sqrt(1 - 0.00669437999014 * np.sin(north) ** 2)
-        places.append(
-            radius_m
-            * np.array(
-                [np.cos(north) * np.cos(east), np.cos(north) * np.sin(east), (1 - 0.00669437999014) * np.sin(north)]
-            )
-        )
-    assert np.linalg.norm(found_m[1] - found_m[0]) == pytest.approx(np.linalg.norm(places[1] - places[0]), rel=2e-6)
-
-
-@pytest.mark.parametrize("offset_deg", [(8.5, 50.1), (-81.196, 28.605), (0.0, 0.0), (28.605, -81.196)])
-def test_degrees_that_are_said_to_be_metres_are_refused(tmp_path: Path, offset_deg: tuple[float, float]) -> None:
-    with pytest.raises(GroundError, match="probably degrees"):
-        load_survey(survey_file(tmp_path, geographic_survey("m", offset_deg, 1e-4)))
-
-
-def test_a_survey_in_degrees_gives_metres(tmp_path: Path) -> None:
-    ground = load_survey(survey_file(tmp_path, geographic_survey("lonlat", (8.5, 50.1), 1e-4)))
-    places_m, _ = updated(ground).to_ground(np.array([[100.0, 400.0], [500.0, 400.0], [100.0, 100.0]]))
-    east_m, north_m = places_m[1] - places_m[0], places_m[2] - places_m[0]
-    np.testing.assert_allclose([east_m, north_m], [[28.61, 0.0], [0.0, 33.37]], atol=0.01)
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        (_SURVEY.replace("image_size_px", "size"), "only the keys"),
-        (_SURVEY.replace("image_size_px: [1280, 720]", ""), "image_size_px in a survey file"),
-        (_SURVEY.replace("[1280, 720]", "1280x720"), "2 numbers for image_size_px"),
-        (_SURVEY.replace("[100, 100]", "[100]"), "2 numbers for px of 'kerb'"),
-        (_SURVEY.replace("m: [0, 3]", "m: [0, .nan]"), "finite numbers for m of 'kerb'"),
-        (_SURVEY.replace(", m: [0, 3]", ""), "2 numbers for m of 'kerb'"),
-        (_SURVEY.replace("m: [0, 3]", "metres: [0, 3]"), "only the keys lonlat, m, name, px"),
-        (_SURVEY.replace("m: [0, 3]", "lonlat: [8.1, 50.2]"), "points in m or in lonlat"),
-        (
-            _SURVEY.replace("m: [0, ", "lonlat: [8, 9").replace("m: [4, ", "lonlat: [8, 9"),
-            "degrees [longitude, latitude]",
-        ),
-        (_SURVEY.replace("manhole", "kerb"), "'kerb' twice"),
-        (_SURVEY.rsplit("  -", 1)[0], "four or more points, each with px and m, found 3"),
-        ("image_size_px: [1280, 720]\npoints: none\n", "a list of points"),
-        (_SURVEY + "area_px: [[0, 0], [9, 0], [9]]\n", "rows of different lengths"),
-        (_SURVEY + "camera: missing.yaml\n", "a camera file at"),
-        (_SURVEY + "point_sigma_px: wide\n", "a number for point_sigma_px"),
-        ("points: [", "not YAML"),
-    ],
-)
-def test_a_survey_file_that_is_wrong_gets_one_line_that_says_how(tmp_path: Path, text: str, message: str) -> None:
-    with pytest.raises(GroundError) as caught:
-        load_survey(survey_file(tmp_path, text))
-    assert message in str(caught.value)
-    assert "\n" not in str(caught.value)
-
-
-@examples(200)
-@given(mutated(st.just(_SURVEY.encode())))
-def test_a_damaged_survey_file_is_a_map_or_one_line(content: bytes) -> None:
-    with TemporaryDirectory() as folder:
-        path = Path(folder) / "survey.yaml"
-        path.write_bytes(content)
-        try:
-            ground = load_survey(path)
-        except GroundError as error:
-            assert "\n" not in str(error)
-        else:
-            assert np.isfinite(ground.fit.image_to_ground).all()

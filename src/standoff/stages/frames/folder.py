@@ -12,7 +12,6 @@ from typing import Any
 import av
 
 from standoff.core.errors import SourceError
-from standoff.files.lfs import refuse_pointer
 from standoff.stages.frames.album import read_album
 from standoff.stages.frames.fingerprint import fingerprint
 from standoff.stages.frames.orientation import UPRIGHT, Orientation
@@ -66,7 +65,6 @@ def _decode(path: Path, orientation: Orientation, scaler: Scaler) -> AvPicture:
         if frame is None:
             raise ValueError("it holds no picture")
     except (av.FFmpegError, IndexError, OSError, ValueError) as error:
-        refuse_pointer(path, f"an image in {path.name}", SourceError)
         raise SourceError(
             expected="an image that can be decoded",
             found=f"{path.name}: {error}",

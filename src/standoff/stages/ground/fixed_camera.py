@@ -147,14 +147,14 @@ class FixedCamera:
         same_lens = isinstance(motion, CameraMotion) and (motion.camera is None) == (surveyed.camera is None)
         if not same_lens or moved_px > _MOST_SHARE * width_px or sigma_px > _SURE_SHARE * width_px:
             return NoGroundMap(MOVED)
-        return _carried(surveyed, moved)
+        return _carried_map(surveyed, moved)
 
 
 def _unmoved(frame: Frame) -> _Moved:
     return _Moved(frame.time_s, np.eye(3), np.zeros((9, 9)))
 
 
-def _carried(surveyed: GroundMap, moved: _Moved) -> GroundMap:
+def _carried_map(surveyed: GroundMap, moved: _Moved) -> GroundMap:
     back = homography.invert(moved.matrix)
     matrix = surveyed.image_to_ground @ back
     by_map, by_motion = np.kron(np.eye(3), back.T), -np.kron(matrix, back.T)

@@ -7,7 +7,7 @@ from collections import deque
 from standoff.core.homography import BoolArray
 from standoff.core.types import Hazard
 from standoff.core.unfollowed import are_many
-from standoff.stages.hazard.life import Latch, OpenHazard
+from standoff.stages.hazard.life import Latch, StreamHazard
 from standoff.stages.hazard.params import HazardParams
 
 NOT_FOLLOWED = "sure detections are in no track"
@@ -17,7 +17,7 @@ _WINDOW_S = 3.0
 _FEWEST_LOOKS = 3
 
 
-class FollowWatch:
+class FollowWatch(StreamHazard):
     """The hazard of a stream in which many sure detections belong to no track.
 
     Args:
@@ -25,9 +25,9 @@ class FollowWatch:
     """
 
     def __init__(self, params: HazardParams) -> None:
+        super().__init__()
         self._lost = Latch(0.0, params.release_s)
         self._looks: deque[tuple[float, int, int]] = deque()
-        self._hazard: OpenHazard | None = None
         self._opened = False
         self._unfollowed = self._sure = 0
 
@@ -53,12 +53,4 @@ class FollowWatch:
         if self._hazard is not None:
             return None
         self._opened = True
-        self._hazard = OpenHazard("measurement", (), "unknown")
-        return self._hazard.event("opened", time_s, reason=NOT_FOLLOWED)
-
-    def end(self, time_s: float, reason: str) -> Hazard | None:
-        """Close the hazard, if one is open."""
-        if self._hazard is None:
-            return None
-        closing, self._hazard = self._hazard, None
-        return closing.event("closed", time_s, reason=reason)
+        return self.begin(time_s, NOT_FOLLOWED)

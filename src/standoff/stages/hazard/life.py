@@ -110,3 +110,22 @@ class OpenHazard:
     def silent_s(self, time_s: float) -> float:
         """Return for how long nothing was said."""
         return time_s - self._said_s
+
+
+class StreamHazard:
+    """The hazard of a stream as a whole, if one is open: what tells of no pair but of all that is measured."""
+
+    def __init__(self) -> None:
+        self._hazard: OpenHazard | None = None
+
+    def begin(self, time_s: float, reason: str) -> Hazard:
+        """Open the hazard."""
+        self._hazard = OpenHazard("measurement", (), "unknown")
+        return self._hazard.event("opened", time_s, reason=reason)
+
+    def end(self, time_s: float, reason: str) -> Hazard | None:
+        """Close the hazard, if one is open."""
+        if self._hazard is None:
+            return None
+        closing, self._hazard = self._hazard, None
+        return closing.event("closed", time_s, reason=reason)

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from standoff.core.homography import BoolArray
 from standoff.core.types import GroundMap, GroundPositions, Hazard, NoGroundMap, Proximities
 from standoff.stages.hazard.follow import FollowWatch
-from standoff.stages.hazard.life import Latch, OpenHazard, Reading
+from standoff.stages.hazard.life import Latch, Reading, StreamHazard
 from standoff.stages.hazard.pair import PairWatch
 from standoff.stages.hazard.params import HazardParams
 
@@ -20,7 +20,7 @@ MAP_IS_BACK = "ground map is back"
 STREAM_ENDED = "end of stream"
 
 
-class MapWatch:
+class MapWatch(StreamHazard):
     """The hazard of a stream that cannot be measured at all because it has no ground map.
 
     Args:
@@ -28,11 +28,11 @@ class MapWatch:
     """
 
     def __init__(self, params: HazardParams) -> None:
+        super().__init__()
         self._params = params
         self._missing = Latch(params.min_duration_s, params.release_s)
         # A stream that starts without a map says so at once: only a map that comes and goes can flicker.
         self._missing.hold_on()
-        self._hazard: OpenHazard | None = None
 
     def update(self, time_s: float, ground: GroundMap | NoGroundMap) -> Hazard | None:
         """Take the frame's map and return what there is to say of it."""
@@ -43,18 +43,10 @@ class MapWatch:
         if not isinstance(ground, NoGroundMap):
             return None
         if self._hazard is None:
-            self._hazard = OpenHazard("measurement", (), "unknown")
-            return self._hazard.event("opened", time_s, reason=ground.reason)
+            return self.begin(time_s, ground.reason)
         if self._hazard.reason == ground.reason or self._hazard.silent_s(time_s) < self._params.update_every_s:
             return None
         return self._hazard.event("updated", time_s, reason=ground.reason)
-
-    def end(self, time_s: float, reason: str) -> Hazard | None:
-        """Close the hazard, if one is open."""
-        if self._hazard is None:
-            return None
-        closing, self._hazard = self._hazard, None
-        return closing.event("closed", time_s, reason=reason)
 
 
 class HazardMonitor:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from standoff.core.classes import CLASSES, Role
+from standoff.core.classes import Role, class_ids
 from standoff.core.homography import FloatArray
 from standoff.core.types import Detections, GroundMap, IntArray, NoGroundMap
 from standoff.stages.track.motion import MotionArray
@@ -24,8 +24,6 @@ PLACE_FIELDS: list[Any] = [
 ]
 """Fields of a structured row: where it stood when it was last seen, how fast it went there from where it was seen
 before, when, and in which site frame; NaN where no map told."""
-
-_IS_PERSON = np.array([site_class.role is Role.PERSON for site_class in CLASSES])
 
 
 def start(rows: MotionArray) -> None:
@@ -94,7 +92,7 @@ def closeness(
     if isinstance(ground, NoGroundMap):
         return np.zeros((len(rows), len(places_m)))
     step_s = time_s - rows["place_s"]
-    fastest_mps = np.where(_IS_PERSON[class_id], params.person_speed_mps, params.machine_speed_mps)
+    fastest_mps = np.where(np.isin(class_id, class_ids(Role.PERSON)), params.person_speed_mps, params.machine_speed_mps)
     reach_m = (params.place_slack_m + fastest_mps * step_s)[:, None]
     same_frame = (rows["site_frame"] == ground.site_frame)[:, None]
     moved_m = places_m - rows["place_m"][:, None]

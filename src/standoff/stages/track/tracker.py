@@ -7,10 +7,11 @@ import math
 import numpy as np
 
 from standoff.core.boxes import overlaps
-from standoff.core.classes import CLASSES, Role
+from standoff.core.classes import CLASSES
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.picture_step import picture_step
 from standoff.core.protocols import AnyGround, AnyMotion
+from standoff.core.roles import REFERENCE_ROLE, ROLE_OF_CLASS
 from standoff.core.types import CameraMotion, Detections, IntArray, NoCameraMotion, Tracks
 from standoff.stages.track import foot, reach
 from standoff.stages.track import motion as box_motion
@@ -33,8 +34,6 @@ _ROW = np.dtype(
         ("sure_s", np.float64),
     ]
 )
-_ROLE = np.array([list(Role).index(site_class.role) for site_class in CLASSES])
-_REFERENCE = list(Role).index(Role.REFERENCE)
 _OTHER_CLASS = 0.7
 _TIME_ROUNDING_S = 1e-6
 _LEAST_CLOSENESS = 1e-6
@@ -163,9 +162,9 @@ class Tracker:
     def _relevant(self, detections: Detections) -> Detections:
         """Drop reference objects, hopeless scores, and a machine's second box under another class."""
         surest_first = np.argsort(-detections.score, kind="stable")
-        wanted = (_ROLE[detections.class_id] != _REFERENCE) & (detections.score >= self._params.low_score)
+        wanted = (ROLE_OF_CLASS[detections.class_id] != REFERENCE_ROLE) & (detections.score >= self._params.low_score)
         detections = detections[surest_first[wanted[surest_first]]]
-        class_id, role = detections.class_id, _ROLE[detections.class_id]
+        class_id, role = detections.class_id, ROLE_OF_CLASS[detections.class_id]
         same_thing = (role[:, None] == role) & (class_id[:, None] != class_id)
         if same_thing.any():
             same_thing &= overlaps(detections.xyxy_px, detections.xyxy_px) >= self._params.duplicate_overlap
@@ -211,9 +210,11 @@ class Tracker:
 
     def _closeness(self, detections: Detections, places_m: FloatArray, ground: AnyGround) -> FloatArray:
         """Return (M, N) closeness on the ground of the tracks that the last look saw; 0 for another role."""
+        if not self._looks_are_rare:
+            return np.zeros((len(self._rows), len(detections)))
         class_id = self._class_id(self._rows)
         closeness = reach.closeness(self._rows, class_id, places_m, ground, self._time_s, self._params)
-        just_seen: BoolArray = (self._rows["seen_s"] == self._looked_s) & self._looks_are_rare
+        just_seen: BoolArray = self._rows["seen_s"] == self._looked_s
         likeness: FloatArray = self._agreement(detections) * closeness * just_seen[:, None]
         return likeness
 
@@ -221,7 +222,7 @@ class Tracker:
         """Return (M, N) how well classes agree."""
         class_id = self._class_id(self._rows)[:, None]
         agreement: FloatArray = np.where(class_id == detections.class_id, 1.0, _OTHER_CLASS)
-        agreement *= _ROLE[class_id] == _ROLE[detections.class_id]
+        agreement *= ROLE_OF_CLASS[class_id] == ROLE_OF_CLASS[detections.class_id]
         return agreement
 
     def _continue(self, which: IntArray, detections: Detections, by: IntArray) -> None:

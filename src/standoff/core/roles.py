@@ -1,0 +1,12 @@
+"""The roles of many classes at once."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from standoff.core.classes import CLASSES, Role
+
+ROLE_OF_CLASS = np.array([list(Role).index(site_class.role) for site_class in CLASSES])
+"""By class id, the position of its role in `Role`."""
+
+REFERENCE_ROLE = list(Role).index(Role.REFERENCE)
