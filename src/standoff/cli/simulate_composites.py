@@ -29,6 +29,7 @@ def composites(
     excavator_mesh: Annotated[
         Path | None, typer.Option(help="Folder of COLLADA or glTF parts for a third of the excavators.")
     ] = None,
+    machines: Annotated[int, typer.Option(min=0, max=30, help="Most machines in a picture.")] = 4,
     processes: Annotated[int, typer.Option(min=1, help="Side by side; the result does not depend on it.")] = 2,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the folder if it exists.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress bar.")] = False,
@@ -43,7 +44,7 @@ def composites(
     width_px, height_px = two_integers(size, "x", expected="a size as WIDTHxHEIGHT", example="1920x1080")
     plan = CompositePlan(
         backgrounds=tuple(backgrounds), images=images, width_px=width_px, height_px=height_px, held_out=held_out,
-        seed=seed, excavator_mesh=excavator_mesh,
+        seed=seed, excavator_mesh=excavator_mesh, most_machines=machines,
     )  # fmt: skip
     with progress("compositing", images, quiet=quiet, unit="pictures") as step:
         record_composites(plan, out, overwrite=overwrite, processes=processes, on_picture=step)

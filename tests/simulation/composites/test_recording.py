@@ -103,7 +103,19 @@ def test_another_seed_gives_other_pictures(sets: SimpleNamespace, tmp_path: Path
     assert other.read_bytes() not in set(_content(sets.one).values())
 
 
-@pytest.mark.parametrize("change", [{"seed": -1}, {"width_px": 193}])
+def test_as_many_machines_as_are_asked_for(sets: SimpleNamespace, tmp_path: Path) -> None:
+    """None where none may be, and more where more may be."""
+    found = {}
+    for most in (0, 20):
+        record_composites(replace(sets.plan, most_machines=most, seed=6), tmp_path / str(most), processes=1)
+        labels = (tmp_path / str(most) / "labels").glob("*/*.txt")
+        kinds = [int(line.split()[0]) for path in labels for line in path.read_text().splitlines()]
+        found[most] = sum(kind in range(1, 5) for kind in kinds)
+    assert found[0] == 0
+    assert found[20] > sets.plan.images
+
+
+@pytest.mark.parametrize("change", [{"seed": -1}, {"width_px": 193}, {"most_machines": 31}])
 def test_a_plan_that_cannot_be_made_is_refused(change: dict[str, int]) -> None:
     plan = CompositePlan(("photographs",), 4, *_SIZE_PX, held_out=0.1, seed=0)
     with pytest.raises(ConfigError):

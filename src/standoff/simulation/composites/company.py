@@ -41,7 +41,9 @@ _FAMILIES = (*CLUTTER, *(prop for name, prop in PLANT.items() if name != "crane"
 _SHAPES = ("square_footing", "quadrilateral_footing", "painted_square")
 _REFERENCE_ID = 1000
 _REFERENCE_SHARE = 0.12
-_MOST_PEOPLE, _MOST_MACHINES, _MOST_PROPS = 12, 4, 25
+_MACHINE_SHARE = 0.43
+"""Of the most machines that are there, on average."""
+_MOST_PEOPLE, _MOST_PROPS = 12, 25
 _CROWD_SHARE = 0.3
 _NEAR_SHARE = 0.55
 _HIDING_SHARE = 0.3
@@ -73,7 +75,7 @@ class Company:
 
 def gather(
     rng: np.random.Generator, framed: Framed, taken: Sequence[shapely.Polygon], ground: Plane, mesh: Path | None, *,
-    deserted: bool,
+    most_machines: int, deserted: bool,
 ) -> Company:  # fmt: skip
     """Draw who and what is there.
 
@@ -83,12 +85,13 @@ def gather(
         taken: Ground that is not free.
         ground: Its colour is what camouflaged people wear.
         mesh: Folder of excavator parts, or None.
+        most_machines: That are there.
         deserted: Clutter only.
     """
     floor = _Floor(rng, framed.view, framed.image, list(taken))
     company = Company()
     if not deserted:
-        _add_machines(rng, floor, company, mesh)
+        _add_machines(rng, floor, company, mesh, most_machines)
         _add_people(rng, floor, company, ground)
         if rng.random() < _REFERENCE_SHARE:
             _add_reference(rng, floor, company, ground)
@@ -138,9 +141,11 @@ class _Floor:
         return True
 
 
-def _add_machines(rng: np.random.Generator, floor: _Floor, company: Company, mesh: Path | None) -> None:
+def _add_machines(
+    rng: np.random.Generator, floor: _Floor, company: Company, mesh: Path | None, most: int
+) -> None:
     names, shares = zip(*_MACHINES, strict=True)
-    for _ in range(int(rng.choice(_MOST_MACHINES + 1, p=[0.2, 0.27, 0.25, 0.18, 0.1]))):
+    for _ in range(int(rng.binomial(most, _MACHINE_SHARE))):
         kind = str(rng.choice(names, p=shares))
         model = _make_machine(rng, kind, mesh)
         for _ in range(_TRIES):

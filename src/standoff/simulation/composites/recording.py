@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 import shapely
 
+from standoff.core.errors import ConfigError
 from standoff.core.homography import FloatArray
 from standoff.core.pose import View
 from standoff.core.types import ImageArray
@@ -35,6 +36,8 @@ from standoff.simulation.soil_colours import PALETTES
 from standoff.simulation.terrain_plan import Soil
 from standoff.simulation.truth import Row, entity_rows
 
+MOST_MACHINES = 30
+"""In one picture that may be asked for; beyond, the ground is full."""
 _UNTOUCHED_SHARE, _DESERTED_SHARE = 0.05, 0.10
 _SMEARED_SHARE, _LONGEST_SMEAR_PX = 0.2, 6.0
 _QUALITIES = (50, 65, 75, 85, 92, 95)
@@ -57,9 +60,10 @@ class CompositePlan:
         held_out: Share of flights and of pictures for each of val and test.
         seed: Of everything random.
         excavator_mesh: Folder of mesh parts for a third of the excavators, or None.
+        most_machines: In a picture; many teach where a machine stands, whichever way it is turned.
 
     Raises:
-        ConfigError: A size or seed out of range.
+        ConfigError: A size, seed or number of machines out of range.
     """
 
     backgrounds: tuple[str, ...]
@@ -69,10 +73,16 @@ class CompositePlan:
     held_out: float
     seed: int
     excavator_mesh: Path | None = None
+    most_machines: int = 4
 
     def __post_init__(self) -> None:
         check_seed(self.seed)
         check_size(self.width_px, self.height_px)
+        if not 0 <= self.most_machines <= MOST_MACHINES:
+            raise ConfigError(
+                expected=f"0 to {MOST_MACHINES} machines in a picture", found=str(self.most_machines),
+                fix="choose a number in this range",
+            )  # fmt: skip
 
     def split_of(self, index: int, splits: dict[Split, tuple[Background, ...]]) -> Split:
         """Return the split of a picture; without flights that are held out all pictures are for training."""
@@ -129,7 +139,7 @@ def open_compositor(plan: CompositePlan) -> Generator[Callable[[int], Picture], 
             background = _choose(rng, splits[plan.split_of(index, splits)])
             framed = frame(rng, background, size_px)
             condition = background.conditions[int(rng.integers(len(background.conditions)))]
-            image, rows = _compose(rng, renderer, framed, condition, plan.excavator_mesh)
+            image, rows = _compose(rng, renderer, framed, condition, plan)
             image = _photograph(rng, image, condition)
             jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, int(rng.choice(_QUALITIES))])[1]
             ignored = [(float(a), float(b), float(c), float(d)) for a, b, c, d in framed.ignored_px]
@@ -147,7 +157,7 @@ def _choose(rng: np.random.Generator, backgrounds: Sequence[Background]) -> Back
 
 
 def _compose(
-    rng: np.random.Generator, renderer: Renderer, framed: Framed, condition: Condition, mesh: Path | None
+    rng: np.random.Generator, renderer: Renderer, framed: Framed, condition: Condition, plan: CompositePlan
 ) -> tuple[ImageArray, list[Row]]:
     """Return the picture before the camera's own faults, and what is marked in it."""
     kept = [_marked(box, int(kind)) for box, kind in zip(framed.xyxy_px, framed.class_id, strict=True)]
@@ -160,7 +170,9 @@ def _compose(
     ground = Plane((red, green, blue), tuple(palette[int(rng.integers(*_DUST_TONES)), 0].tolist()))
     taken = [_footprint(framed.view, box) for box in framed.xyxy_px]
     deserted = chance < _UNTOUCHED_SHARE + _DESERTED_SHARE
-    company = gather(rng, framed, taken, ground, mesh, deserted=deserted)
+    company = gather(
+        rng, framed, taken, ground, plan.excavator_mesh, most_machines=plan.most_machines, deserted=deserted
+    )
     moment = scene_at(_scene(company, ground, light, framed.view), MOMENT_S)
     renderer.load(ground, company.props)
     cutout = renderer.cut_out(framed.view, moment.batches, light)
