@@ -206,9 +206,11 @@ class GroundPositions(Rows):
         class_id: (M,) ids of `CLASSES`.
         xy_m: (M, 2) site frame; NaN where invalid.
         velocity_mps: (M, 2) site frame; NaN while unknown.
-        covariance_m2: (M, 2, 2) of xy_m, the map's share included; NaN where invalid.
+        state_covariance: (M, 4, 4) of x, y in metres and vx, vy in metres per second, where the velocity is unknown of
+            0 in its place, without the map's share; NaN where invalid.
         map_factor_m: (M, 2, 10) the map's share F: covariance F_i F_i^T, and F_i F_j^T between two entities,
             because all of a frame's positions lean on the same map; NaN where invalid.
+        predicted: (M,) True where the position was not measured in this frame.
         radius_m: (M,) action radius.
         valid: (M,).
         reason: (M,) text; empty where valid.
@@ -218,8 +220,9 @@ class GroundPositions(Rows):
     class_id: IntArray
     xy_m: FloatArray
     velocity_mps: FloatArray
-    covariance_m2: FloatArray
+    state_covariance: FloatArray
     map_factor_m: FloatArray
+    predicted: BoolArray
     radius_m: FloatArray
     valid: BoolArray
     reason: TextArray
@@ -229,8 +232,9 @@ class GroundPositions(Rows):
         "class_id": (np.int64, ()),
         "xy_m": (np.float64, (2,)),
         "velocity_mps": (np.float64, (2,)),
-        "covariance_m2": (np.float64, (2, 2)),
+        "state_covariance": (np.float64, (4, 4)),
         "map_factor_m": (np.float64, (2, 10)),
+        "predicted": (np.bool_, ()),
         "radius_m": (np.float64, ()),
         "valid": (np.bool_, ()),
         "reason": (np.object_, ()),
@@ -240,6 +244,12 @@ class GroundPositions(Rows):
         Rows.__post_init__(self)
         if not np.isfinite(self.xy_m[self.valid]).all() or not np.isnan(self.xy_m[~self.valid]).all():
             raise ValueError("GroundPositions.xy_m must be finite where valid and NaN where not")
+
+    @property
+    def covariance_m2(self) -> FloatArray:
+        """(M, 2, 2) of xy_m, the map's share included; NaN where invalid."""
+        shared: FloatArray = self.map_factor_m @ self.map_factor_m.transpose(0, 2, 1)
+        return self.state_covariance[:, :2, :2] + shared
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,10 +1,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
-from stages.locate.oblique_world import SIZE_PX, ground_map, seen_px, space_px, standing, tracks_of
+from stages.locate.oblique_world import HEIGHT_M, SIZE_PX, ground_map, seen_px, space_px, standing, tracks_of
 from tolerances import GEOMETRY_REL, GROUND_THROUGH_LENS_M
 
 from standoff.core import homography
@@ -16,8 +17,8 @@ from standoff.stages.locate.params import Anchor
 
 GROUND_M = np.array([[0.0, 35.0], [-8.0, 28.0], [12.0, 45.0], [5.0, 60.0]])
 LENS = np.array([-0.12, 0.03, 0.001, -0.0008, 0.0])
-FEET = LocateParams(anchor="bottom_centre")
-"""Exact for boxes that stand on a point, whatever is in them."""
+FEET = LocateParams(anchor="bottom_centre", relief_sigma_m=0.0)
+"""Exact for boxes that stand on a point, whatever is in them, on level ground."""
 
 
 def box_with_foot_at(x: float, y: float) -> FloatArray:
@@ -159,7 +160,8 @@ def test_an_anchor_between_two_edges_has_half_the_variance_of_one(
     anchor: Anchor, up_px: float, vertical_edges: int
 ) -> None:
     boxes = standing(seen_px(GROUND_M), width_px=40.0, height_px=50.0)
-    found = Locator(LocateParams(anchor=anchor)).update(0.0, tracks_of(boxes), ground_map()).covariance_m2
+    params = LocateParams(anchor=anchor, relief_sigma_m=0.0)
+    found = Locator(params).update(0.0, tracks_of(boxes), ground_map()).covariance_m2
     points_px = seen_px(GROUND_M) - np.array([0.0, up_px])
     jacobian = homography.point_jacobian(ground_map().image_to_ground, points_px)
     variance_px2 = np.array([(0.06 * 40.0) ** 2 / 2.0, (0.06 * 50.0) ** 2 / vertical_edges])
@@ -186,16 +188,64 @@ def test_each_map_has_its_own_share() -> None:
     assert np.abs(once).max() > 0
 
 
-def test_coasting_makes_a_position_less_sure_with_time() -> None:
+def test_a_place_that_is_not_seen_is_predicted_less_and_less_surely_and_then_unknown() -> None:
     boxes = standing(seen_px(GROUND_M[:1]))
     locator, ground = Locator(), ground_map()
-    seen = locator.update(0.0, tracks_of(boxes), ground).covariance_m2[0]
-    early = locator.update(0.2, tracks_of(boxes, observed=[False]), ground).covariance_m2[0]
-    late = locator.update(0.4, tracks_of(boxes, observed=[False]), ground).covariance_m2[0]
-    again = locator.update(0.6, tracks_of(boxes), ground).covariance_m2[0]
-    assert (np.linalg.eigvalsh(early - seen) > 0).all()
-    np.testing.assert_allclose(late - seen, 4.0 * (early - seen), rtol=GEOMETRY_REL)
-    np.testing.assert_array_equal(again, seen)
+    first = locator.update(0.0, tracks_of(boxes), ground)
+    spread_m2 = [first.covariance_m2[0]]
+    for time_s in (0.2, 0.4, 1.0):
+        later = locator.update(time_s, tracks_of(boxes, observed=[False]), ground)
+        assert later.valid.all() and later.predicted.all()
+        np.testing.assert_allclose(later.xy_m, first.xy_m, atol=GEOMETRY_REL)
+        spread_m2.append(later.covariance_m2[0])
+    assert all((np.linalg.eigvalsh(b - a) > 0).all() for a, b in pairwise(spread_m2))
+    gone = locator.update(1.2, tracks_of(boxes, observed=[False]), ground)
+    assert gone.reason.tolist() == ["not seen any more"]
+    again = locator.update(1.4, tracks_of(boxes), ground)
+    assert again.valid.all() and not again.predicted.any()
+    assert (np.linalg.eigvalsh(spread_m2[-1] - again.covariance_m2[0]) > 0).all()
+
+
+def test_what_the_edge_cuts_off_is_predicted_from_where_it_was_whole() -> None:
+    locator, ground = Locator(FEET), ground_map()
+    for step in range(12):
+        tracks = tracks_of(box_with_foot_at(960.0, 1062.0))
+        locator.update(0.1 * step, tracks, ground)
+    whole = locator.update(1.2, tracks, ground)
+    cut = locator.update(1.3, tracks_of(box_with_foot_at(960.0, 1079.0)), ground)
+    assert cut.valid.all() and cut.predicted.all()
+    assert np.linalg.norm(cut.xy_m - whole.xy_m) < 0.1
+    assert (np.linalg.eigvalsh(cut.covariance_m2[0] - whole.covariance_m2[0]) > 0).all()
+    late = locator.update(2.4, tracks_of(box_with_foot_at(960.0, 1079.0)), ground)
+    assert late.reason.tolist() == ["cut off by the picture's edge"]
+
+
+def test_ground_of_unknown_height_makes_a_place_unsure_along_the_view_only() -> None:
+    tracks, height_m = tracks_of(standing(seen_px(GROUND_M))), 0.5
+    level, rough = (
+        Locator(LocateParams(anchor="bottom_centre", relief_sigma_m=sigma_m)).update(0.0, tracks, ground_map())
+        for sigma_m in (0.0, height_m)
+    )
+    gained_m2 = rough.covariance_m2 - level.covariance_m2
+    along = GROUND_M / np.linalg.norm(GROUND_M, axis=1, keepdims=True)
+    # Ground that is higher by h hides what lies h over the height of the camera further away.
+    shift_m = np.linalg.norm(GROUND_M, axis=1) / HEIGHT_M * height_m
+    expected = np.einsum("n,ni,nj->nij", shift_m**2, along, along)
+    assert np.abs(GROUND_M[0, 0]) == 0.0  # in the middle of the picture, where it is exact
+    np.testing.assert_allclose(gained_m2[0], expected[0], rtol=1e-3)
+    sizes = np.sqrt(np.linalg.eigvalsh(gained_m2)[:, 1] / shift_m**2)
+    assert (np.abs(sizes - 1.0) < 1 / 6).all()
+    aligned = np.einsum("nij,ni,nj->n", gained_m2, along, along) / np.trace(gained_m2, axis1=1, axis2=2)
+    assert (aligned > 0.98).all()
+
+
+def test_off_smoothing_each_frame_stands_for_itself() -> None:
+    rng = np.random.default_rng(3)
+    locator = Locator(LocateParams(anchor="bottom_centre", smooth=False))
+    for step in range(5):
+        places_m = GROUND_M + rng.normal(size=GROUND_M.shape)
+        positions = locator.update(0.1 * step, tracks_of(standing(seen_px(places_m))), ground_map())
+        np.testing.assert_allclose(positions.xy_m, places_m, rtol=GEOMETRY_REL, atol=GEOMETRY_REL)
 
 
 def test_action_radii_come_from_the_class_then_the_settings_then_the_track() -> None:
@@ -212,33 +262,31 @@ def test_wrong_settings_are_named() -> None:
         LocateParams(radius_m={"worker": -1.0})
     with pytest.raises(ValueError, match="action radius of 7 must be a number of metres from 0, not nan"):
         LocateParams(track_radius_m={7: float("nan")})
-    with pytest.raises(ValueError, match="velocity_min_span_s"):
-        LocateParams(velocity_window_s=0.2)
 
 
 def test_velocity_comes_from_observed_positions_and_is_unknown_where_invalid() -> None:
     locator = Locator(FEET)
-    for step in range(11):
+    for step in range(31):
         walked = GROUND_M[:1] + np.array([[1.4, 0.0]]) * (0.1 * step)
         positions = locator.update(0.1 * step, tracks_of(standing(seen_px(walked))), ground_map())
-    np.testing.assert_allclose(positions.velocity_mps, [[1.4, 0.0]], atol=GEOMETRY_REL)
+        assert step > 0 or np.isnan(positions.velocity_mps).all()
+    np.testing.assert_allclose(positions.velocity_mps, [[1.4, 0.0]], atol=0.1)
+    np.testing.assert_allclose(positions.xy_m, walked, atol=0.1)
     elsewhere = tracks_of(standing(seen_px(GROUND_M[1:2])), observed=[False])
-    np.testing.assert_allclose(
-        locator.update(1.1, elsewhere, ground_map()).velocity_mps, [[1.4, 0.0]], atol=GEOMETRY_REL
-    )
-    unmapped = locator.update(1.2, tracks_of(standing(seen_px(GROUND_M[:1]))), NoGroundMap("stale"))
+    np.testing.assert_allclose(locator.update(3.1, elsewhere, ground_map()).velocity_mps, [[1.4, 0.0]], atol=0.2)
+    unmapped = locator.update(3.2, tracks_of(standing(seen_px(GROUND_M[:1]))), NoGroundMap("stale"))
     assert np.isnan(unmapped.velocity_mps).all()
 
 
 def test_a_reset_forgets_and_leaves_other_streams_alone() -> None:
     first, second = Locator(), Locator()
-    for step in range(6):
+    for step in range(16):
         for locator in (first, second):
             locator.update(0.1 * step, tracks_of(standing(seen_px(GROUND_M[:1]))), ground_map())
     first.reset()
     tracks = tracks_of(standing(seen_px(GROUND_M[:1])))
-    assert np.isnan(first.update(0.6, tracks, ground_map()).velocity_mps).all()
-    assert np.isfinite(second.update(0.6, tracks, ground_map()).velocity_mps).all()
+    assert np.isnan(first.update(1.6, tracks, ground_map()).velocity_mps).all()
+    assert np.isfinite(second.update(1.6, tracks, ground_map()).velocity_mps).all()
 
 
 def _pointed(boxes: FloatArray, foot_px: FloatArray, sigma_px: float) -> Tracks:
@@ -260,8 +308,9 @@ def test_a_ground_point_goes_before_every_point_of_the_box_also_where_the_pictur
     for anchor in ("bottom_centre", "box_centre"):
         by_box = Locator(LocateParams(anchor=anchor)).update(0.0, _pointed(boxes, foot_px, 1.0), ground)
         assert np.abs(by_box.xy_m - GROUND_M)[by_box.valid].min() > 0.05
-    wider = Locator().update(0.0, _pointed(boxes, foot_px, 3.0), ground)
-    np.testing.assert_allclose(wider.covariance_m2, 9.0 * positions.covariance_m2, rtol=1e-6)
+    level = LocateParams(relief_sigma_m=0.0)
+    sure, wider = (Locator(level).update(0.0, _pointed(boxes, foot_px, sigma), ground) for sigma in (1.0, 3.0))
+    np.testing.assert_allclose(wider.covariance_m2, 9.0 * sure.covariance_m2, rtol=1e-6)
 
 
 def test_tracks_without_a_ground_point_stand_where_their_boxes_do() -> None:

@@ -30,13 +30,18 @@ def positions_of(
     place = np.array(xy_m, dtype=np.float64).reshape(-1, 2)
     count = len(place)
     valid: BoolArray = np.asarray(np.isfinite(place).all(axis=1))
+    factor_m = np.zeros((count, 2, 10)) if map_factor_m is None else map_factor_m
+    state = np.zeros((count, 4, 4))
+    whole_m2 = np.tile(np.eye(2) * 0.01, (count, 1, 1)) if covariance_m2 is None else covariance_m2
+    state[:, :2, :2] = whole_m2 - factor_m @ factor_m.transpose(0, 2, 1)
     return GroundPositions(
         track_id=np.array(track_id or range(1, count + 1), dtype=np.int64),
         class_id=np.array(class_id, dtype=np.int64),
         xy_m=place,
         velocity_mps=np.zeros((count, 2)) if velocity_mps is None else velocity_mps,
-        covariance_m2=np.tile(np.eye(2) * 0.01, (count, 1, 1)) if covariance_m2 is None else covariance_m2,
-        map_factor_m=np.zeros((count, 2, 10)) if map_factor_m is None else map_factor_m,
+        state_covariance=state,
+        map_factor_m=factor_m,
+        predicted=np.zeros(count, dtype=np.bool_),
         radius_m=np.array([CLASSES[i].action_radius_m for i in class_id]),
         valid=valid,
         reason=np.where(valid, "", "beyond the horizon").astype(object),
@@ -195,7 +200,7 @@ def distances(
 
 
 def test_a_replaced_distance_is_marked_and_its_sigma_tells_how_far_it_was_moved() -> None:
-    found_m, filtered, sigma_m = distances([20.0, 20.0, 35.0, 20.0], ProximityParams())
+    found_m, filtered, sigma_m = distances([20.0, 20.0, 35.0, 20.0], ProximityParams(outlier_filter="paper"))
     assert found_m == [20.0, 20.0, 20.0, 20.0]
     assert filtered == [False, False, True, False]
     assert sigma_m[2] == pytest.approx(np.hypot(15.0, sigma_m[0]))
@@ -205,7 +210,7 @@ def test_the_papers_threshold_is_pixels_of_the_rectified_plane_unless_given_in_m
     coarse = GroundMap(np.eye(3), np.zeros((9, 9)), (1920, 1080), "exact", 0.2)
 
     def is_replaced(jump_m: float, threshold_m: float | None, ground: GroundMap) -> bool:
-        params = ProximityParams(outlier_threshold_m=threshold_m, max_speed_mps=0.0)
+        params = ProximityParams(outlier_filter="paper", outlier_threshold_m=threshold_m)
         return distances([20.0, 20.0, 20.0 + jump_m], params, ground=ground)[1][2]
 
     assert is_replaced(1.01, None, GROUND)
@@ -218,25 +223,21 @@ def test_the_papers_threshold_is_pixels_of_the_rectified_plane_unless_given_in_m
 
 @pytest.mark.parametrize(
     "params",
-    [ProximityParams(outlier_filter="off"), ProximityParams(outlier_threshold_px=None)],
+    [ProximityParams(), ProximityParams(outlier_filter="paper", outlier_threshold_px=None)],
 )
 def test_without_filter_or_threshold_everything_passes(params: ProximityParams) -> None:
     places_m = [20.0, 20.0, 95.0, 20.0]
     assert distances(places_m, params)[0] == places_m
 
 
-def test_only_the_papers_filter_repeats_a_stale_distance_for_ever() -> None:
+def test_the_papers_filter_repeats_a_stale_distance_for_ever() -> None:
     jump_m = [40.0, 40.0, *[9.0] * 30]
     frozen_m, _, _ = distances(jump_m, ProximityParams(outlier_filter="paper"))
     assert set(frozen_m) == {40.0}
-    bounded_m, filtered, _ = distances(jump_m, ProximityParams())
-    assert bounded_m[-1] == 9.0
-    assert sum(filtered) <= 5
 
 
-@pytest.mark.parametrize("name", ["paper", "bounded"])
-def test_a_frame_without_measurement_and_the_end_of_a_track_clear_the_filter(name: str) -> None:
-    params = ProximityParams(outlier_filter="paper" if name == "paper" else "bounded")
+def test_a_frame_without_measurement_and_the_end_of_a_track_clear_the_filter() -> None:
+    params = ProximityParams(outlier_filter="paper")
     found_m, filtered, _ = distances([20.0, 20.0, np.nan, 95.0, 95.0], params)
     assert np.isnan(found_m[2])
     assert found_m[3:] == [95.0, 95.0]
@@ -250,7 +251,8 @@ def test_a_frame_without_measurement_and_the_end_of_a_track_clear_the_filter(nam
 
 
 def test_a_reset_forgets_and_leaves_other_streams_alone() -> None:
-    first, second = ProximityMeter(), ProximityMeter()
+    params = ProximityParams(outlier_filter="paper")
+    first, second = ProximityMeter(params), ProximityMeter(params)
     for i in range(3):
         for meter in (first, second):
             meter.update(0.1 * i, positions_of([(0.0, 0.0), (20.0, 0.0)], [WORKER, LOADER]), GROUND)

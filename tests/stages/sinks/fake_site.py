@@ -164,7 +164,7 @@ class FakeSite:
         valid = np.array([not lost and not (i == 2 and 1.0 <= time_s < 1.6) for i in self.track_id], dtype=bool)
         nan = ~valid
         step = (self.xy_m(time_s + 0.01) - xy) / 0.01
-        covariance = np.tile(np.eye(2) * 0.2**2, (len(xy), 1, 1))
+        covariance = np.tile(np.eye(4) * 0.2**2, (len(xy), 1, 1))
         xy, covariance = xy.copy(), covariance.copy()
         xy[nan], step[nan], covariance[nan] = np.nan, np.nan, np.nan
         return GroundPositions(
@@ -172,8 +172,9 @@ class FakeSite:
             class_id=self.class_id,
             xy_m=xy,
             velocity_mps=step,
-            covariance_m2=covariance,
+            state_covariance=covariance,
             map_factor_m=np.where(nan[:, None, None], np.nan, np.zeros((len(xy), 2, 10))),
+            predicted=np.zeros(len(xy), dtype=bool),
             radius_m=np.array([CLASSES[c].action_radius_m for c in self.class_id.tolist()]),
             valid=valid,
             reason=np.where(valid, "", "no ground map" if lost else "outside the trusted area").astype(object),

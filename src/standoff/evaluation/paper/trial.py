@@ -20,6 +20,7 @@ from standoff.stages.frames import Source
 from standoff.stages.ground import ReferenceShape, ScaleWatch
 from standoff.stages.ground.params import ReferenceMethod
 from standoff.stages.locate.params import Anchor, LocateParams
+from standoff.stages.proximity import ProximityParams
 
 CameraKnowledge = Literal["file", "unknown"]
 HeightKnowledge = Literal["known", "unknown"]
@@ -55,6 +56,11 @@ class Trial:
         return self.anchor or ("box_centre" if self.method == "paper" else LocateParams().anchor)
 
     @property
+    def outlier_filter(self) -> str:
+        """What removes outliers of distances."""
+        return "paper" if self.method == "paper" else ProximityParams().outlier_filter
+
+    @property
     def knows_lens(self) -> bool:
         """Whether the monitor has the camera file."""
         return self.method != "paper" if self.camera is None else self.camera == "file"
@@ -73,7 +79,7 @@ class Trial:
             "detector": self._detector_name(),
             "camera": "file" if self.knows_lens else "unknown",
             "height of the reference": self.height,
-            "outlier filter": "paper",
+            "outlier filter": self.outlier_filter,
         }
         if not isinstance(self.detector, Path):
             about["reference box drawn wide by, px"] = REFERENCE_MARGIN_PX
@@ -140,8 +146,8 @@ def settings_for(clip: Clip, trial: Trial) -> Settings:
     }
     overrides: dict[str, Any] = {
         "ground": ground,
-        "locate": {"anchor": trial.anchor_used},
-        "proximity": {"outlier_filter": "paper"},
+        "locate": {"anchor": trial.anchor_used, "smooth": trial.method != "paper"},
+        "proximity": {"outlier_filter": trial.outlier_filter},
     }
     if isinstance(trial.detector, Path):
         overrides["detections" if is_recording(trial.detector) else "model"] = str(trial.detector)

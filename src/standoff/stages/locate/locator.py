@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from standoff.core import homography
@@ -9,19 +11,45 @@ from standoff.core.classes import CLASSES
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import GroundMap, GroundPositions, NoGroundMap, TextArray, Tracks
 from standoff.stages.locate import class_prior
+from standoff.stages.locate.ground_filter import GroundFilter
 from standoff.stages.locate.params import LocateParams
 from standoff.stages.locate.region import inside
-from standoff.stages.locate.uncertainty import factor, horizon_margin, map_jacobian, own_covariance
-from standoff.stages.locate.velocity import VelocityEstimator
+from standoff.stages.locate.uncertainty import (
+    factor,
+    horizon_margin,
+    map_jacobian,
+    own_covariance,
+    relief_covariance,
+)
 
 CUT_OFF = "cut off by the picture's edge"
 OUTSIDE_LENS = "outside the lens model"
 BEYOND_HORIZON = "beyond the horizon"
 NEAR_HORIZON = "too near the horizon"
 OUTSIDE_MAP = "outside the ground map"
+NOT_SEEN = "not seen any more"
 
+_TIME_ROUNDING_S = 1e-6
 _TOP_COUNTS_BELOW = 0.9
 """Level in the box below which an anchor moves with the upper edge by more than with anything else."""
+
+
+class _Measured(NamedTuple):
+    """What one frame tells of each track, (M,) rows; NaN where it tells nothing.
+
+    Attributes:
+        xy_m: (M, 2).
+        point_m2: (M, 2, 2) its covariance from the point in the picture.
+        lasting_m2: (M, 2, 2) from what does not change while a track is seen: its shape, the ground's.
+        shared_m2: (M, 2, 2) from the map.
+        reason: (M,) why it tells nothing.
+    """
+
+    xy_m: FloatArray
+    point_m2: FloatArray
+    lasting_m2: FloatArray
+    shared_m2: FloatArray
+    reason: TextArray
 
 
 class Locator:
@@ -38,8 +66,7 @@ class Locator:
 
     def __init__(self, params: LocateParams | None = None) -> None:
         self._params = params or LocateParams()
-        self._velocities = VelocityEstimator(self._params.velocity_window_s, self._params.velocity_min_span_s)
-        self._observed_s: dict[int, float] = {}
+        self._filter = GroundFilter()
         self._factored: tuple[GroundMap, FloatArray] | None = None
         self._site_frame = 0
         self._class_radius_m = np.array([self._params.radius_m.get(c.name, c.action_radius_m) for c in CLASSES])
@@ -53,62 +80,82 @@ class Locator:
             ground: The frame's map, or why there is none.
 
         Returns:
-            Row i belongs to track i. A row is invalid, with its reason, when there is no map, when the
-            box may go on outside the picture so that its anchor was not seen (a ground point knows), and when it is
-            outside the lens model, at or beyond the horizon, or outside the map's polygon. Velocity
-            comes from observed positions of one site frame only, not from coasting ones, and is NaN where invalid.
+            Row i belongs to track i. A row is measured where its track is observed and its box or ground point tells
+            where it stands; otherwise predicted, for `predict_s`; then invalid, with its reason: that there is no map,
+            that the box may go on outside the picture so that its anchor was not seen (a ground point knows), that it
+            is outside the lens model, at or beyond the horizon, or outside the map's polygon. Nothing is predicted
+            where there is no map. A velocity is NaN until it is known better than what things of its class do anyway.
         """
-        coasted_s = self._coasted_s(time_s, tracks)
         if isinstance(ground, NoGroundMap):
-            points_px = np.full((len(tracks), 2), np.nan)
-            xy_m = points_px.copy()
-            covariance_m2, map_factor_m = np.full((len(tracks), 2, 2), np.nan), np.full((len(tracks), 2, 10), np.nan)
-            reason = np.full(len(tracks), f"no ground map: {ground.reason}", dtype=object)
-        else:
-            if ground.site_frame != self._site_frame:
-                # Places of two site frames make no motion.
-                self._velocities.reset()
-                self._site_frame = ground.site_frame
-            level = self._levels(tracks, ground)
-            seen_px, seen_covariance_px2 = self._standing(tracks, level, coasted_s)
-            points_px = ground.undistorted(seen_px)
-            root = self._root(ground)
-            margin = horizon_margin(ground, root, points_px, seen_covariance_px2)
-            reason = self._reasons(tracks, level, ground, points_px, margin)
-            points_px = np.where((reason == "")[:, None], points_px, np.nan)
-            xy_m, _ = homography.apply(ground.image_to_ground, points_px)
-            map_factor_m = map_jacobian(ground, points_px) @ root
-            covariance_m2 = own_covariance(ground, points_px, seen_covariance_px2)
-            covariance_m2 += map_factor_m @ map_factor_m.transpose(0, 2, 1)
-            covariance_m2 += self._prior_variance_m2(tracks)[:, None, None] * np.eye(2)
-        valid = np.isfinite(points_px).all(axis=1)
-        velocity_mps = self._velocities.update(time_s, tracks.track_id, xy_m, tracks.observed, valid & tracks.observed)
-        velocity_mps[~valid] = np.nan
+            return self._nowhere(tracks, f"no ground map: {ground.reason}")
+        if ground.site_frame != self._site_frame:
+            # Places of two site frames make no motion.
+            self._filter.reset()
+            self._site_frame = ground.site_frame
+        measured = self._measure(tracks, ground)
+        taken = (measured.reason == "") & tracks.observed
+        filtered = self._filter.update(
+            time_s, tracks.track_id, tracks.class_id, np.where(taken[:, None], measured.xy_m, np.nan),
+            self._params.white_share * measured.point_m2,
+            (1.0 - self._params.white_share) * measured.point_m2 + measured.lasting_m2, measured.shared_m2,
+        )  # fmt: skip
+        mean, covariance = filtered.mean, filtered.covariance
+        if not self._params.smooth:
+            mean[taken, :2] = measured.xy_m[taken]
+            covariance[taken, :2, :2] = (measured.point_m2 + measured.lasting_m2)[taken]
+        placed = time_s - filtered.seen_s <= self._params.predict_s + _TIME_ROUNDING_S
+        there_px, ahead = homography.apply(homography.invert(ground.image_to_ground), mean[:, :2])
+        placed &= ahead
+        mean[~placed], covariance[~placed] = np.nan, np.nan
+        there_px = np.where(placed[:, None], there_px, np.nan)
         return GroundPositions(
             track_id=tracks.track_id,
             class_id=tracks.class_id,
-            xy_m=xy_m,
-            velocity_mps=velocity_mps,
-            covariance_m2=covariance_m2,
-            map_factor_m=map_factor_m,
+            xy_m=mean[:, :2],
+            velocity_mps=np.where(filtered.velocity_known[:, None], mean[:, 2:], np.nan),
+            state_covariance=covariance,
+            map_factor_m=map_jacobian(ground, there_px) @ self._root(ground),
+            predicted=placed & (filtered.seen_s < time_s),
             radius_m=self._radii(tracks),
-            valid=valid,
-            reason=reason,
+            valid=placed,
+            reason=np.where(placed, "", np.where(measured.reason == "", NOT_SEEN, measured.reason)),
         )
 
     def reset(self) -> None:
         """Forget all tracks."""
-        self._velocities.reset()
-        self._observed_s = {}
+        self._filter.reset()
         self._factored = None
 
-    def _coasted_s(self, time_s: float, tracks: Tracks) -> FloatArray:
-        """Return (M,) seconds since each track was last observed, and forget the tracks that are gone."""
-        self._observed_s = {
-            track: time_s if observed else self._observed_s.get(track, time_s)
-            for track, observed in zip(tracks.track_id.tolist(), tracks.observed.tolist(), strict=True)
-        }
-        return time_s - np.array([*self._observed_s.values()], dtype=np.float64)
+    def _nowhere(self, tracks: Tracks, reason: str) -> GroundPositions:
+        count = len(tracks)
+        return GroundPositions(
+            track_id=tracks.track_id,
+            class_id=tracks.class_id,
+            xy_m=np.full((count, 2), np.nan),
+            velocity_mps=np.full((count, 2), np.nan),
+            state_covariance=np.full((count, 4, 4), np.nan),
+            map_factor_m=np.full((count, 2, 10), np.nan),
+            predicted=np.zeros(count, dtype=np.bool_),
+            radius_m=self._radii(tracks),
+            valid=np.zeros(count, dtype=np.bool_),
+            reason=np.full(count, reason, dtype=object),
+        )
+
+    def _measure(self, tracks: Tracks, ground: GroundMap) -> _Measured:
+        """Place all tracks by this frame alone."""
+        level = self._levels(tracks, ground)
+        seen_px, seen_covariance_px2 = self._standing(tracks, level)
+        points_px = ground.undistorted(seen_px)
+        root = self._root(ground)
+        margin = horizon_margin(ground, root, points_px, seen_covariance_px2)
+        reason = self._reasons(tracks, level, ground, points_px, margin)
+        points_px = np.where((reason == "")[:, None], points_px, np.nan)
+        xy_m, _ = homography.apply(ground.image_to_ground, points_px)
+        factor_m = map_jacobian(ground, points_px) @ root
+        lasting_m2 = relief_covariance(ground, points_px, self._params.relief_sigma_m)
+        lasting_m2 += self._prior_variance_m2(tracks)[:, None, None] * np.eye(2)
+        point_m2 = own_covariance(ground, points_px, seen_covariance_px2)
+        return _Measured(xy_m, point_m2, lasting_m2, factor_m @ factor_m.transpose(0, 2, 1), reason)
 
     def _has_point(self, tracks: Tracks) -> BoolArray:
         """Tell (M,) which tracks are placed by their own ground point."""
@@ -129,15 +176,13 @@ class Locator:
         variance_m2: FloatArray = np.where(leaves_open, class_prior.SIGMA_M[tracks.class_id] ** 2, 0.0)
         return variance_m2
 
-    def _standing(self, tracks: Tracks, level: FloatArray, coasted_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _standing(self, tracks: Tracks, level: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return (M, 2) the point of each track that stands on the ground, as seen, and its (M, 2, 2) covariance."""
         own = self._has_point(tracks)
-        longer_px = (tracks.xyxy_px[:, 2:] - tracks.xyxy_px[:, :2]).max(axis=1, initial=0.0)
-        coasting_px2 = (self._params.coast_sigma_per_s * longer_px * coasted_s) ** 2
         points_px = np.where(own[:, None], tracks.foot_px, self._anchors(tracks, level))
         anchor_px2 = self._anchor_variance(tracks, level)[:, :, None] * np.eye(2)
         covariance_px2 = np.where(own[:, None, None], tracks.foot_covariance_px2, anchor_px2)
-        return points_px, covariance_px2 + coasting_px2[:, None, None] * np.eye(2)
+        return points_px, covariance_px2
 
     @staticmethod
     def _anchors(tracks: Tracks, level: FloatArray) -> FloatArray:

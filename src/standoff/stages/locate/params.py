@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
-from annotated_types import Ge, Gt
+from annotated_types import Ge, Interval
 from typing_extensions import Doc
 
 from standoff.core.classes import CLASS_BY_NAME
@@ -36,14 +36,34 @@ class LocateParams:
     edge_sigma_floor_px: Annotated[
         float, Ge(0), Doc("Least standard error of one edge of a box, in pixels, however small the box.")
     ] = 1.0
-    coast_sigma_per_s: Annotated[
+    smooth: Annotated[
+        bool,
+        Doc(
+            "Places are smoothed on the ground as things of the class move; off, each frame's own place counts, as in "
+            "the paper."
+        ),
+    ] = True
+    predict_s: Annotated[
         float,
         Ge(0),
         Doc(
-            "Standard error that a coasting track gains, in longer sides of its box per second: 0.3 is half a metre "
-            "per second for a worker, who can stop or turn within a step."
+            "Where a track was not seen, or not well enough to be located, its place is predicted for so many seconds, "
+            "with an error that grows; then it is unknown."
+        ),
+    ] = 1.0
+    white_share: Annotated[
+        float,
+        Interval(gt=0, le=1),
+        Doc(
+            "Share of the variance of a point in the picture that is another in every frame and averages out; the "
+            "rest stays with a track."
         ),
     ] = 0.3
+    relief_sigma_m: Annotated[
+        float,
+        Ge(0),
+        Doc("Standard deviation of the ground's height about the plane of the map, where things stand."),
+    ] = 0.1
     cut_off_margin_px: Annotated[
         float,
         Ge(0),
@@ -60,12 +80,6 @@ class LocateParams:
             "the camera is good to a third; nearer the horizon no covariance describes the error."
         ),
     ] = 3.0
-    velocity_window_s: Annotated[
-        float, Gt(0), Doc("Velocity is the slope of the observed positions of the last so many seconds.")
-    ] = 1.0
-    velocity_min_span_s: Annotated[
-        float, Gt(0), Doc("Velocity is unknown until the observed positions span so many seconds.")
-    ] = 0.3
     radius_m: Annotated[
         Mapping[str, float],
         Doc("Action radius in metres by class name, in place of the class's own."),
@@ -82,8 +96,3 @@ class LocateParams:
         for name, radius_m in [*self.radius_m.items(), *self.track_radius_m.items()]:
             if not 0 <= radius_m < float("inf"):
                 raise ValueError(f"the action radius of {name} must be a number of metres from 0, not {radius_m}")
-        if self.velocity_min_span_s > self.velocity_window_s:
-            raise ValueError(
-                f"velocity_min_span_s ({self.velocity_min_span_s} s) must not exceed "
-                f"velocity_window_s ({self.velocity_window_s} s)"
-            )

@@ -121,3 +121,28 @@ def horizon_margin(
     margin: FloatArray = denominator / np.sqrt(np.where(exact, 1.0, variance))
     margin[exact & (denominator > 0)] = np.inf
     return margin
+
+
+def relief_covariance(ground: GroundMap, undistorted_px: FloatArray, height_sigma_m: float) -> FloatArray:
+    """Return what ground that lies higher or lower than the map's plane does to a place: it moves along the view.
+
+    The angle of the view is taken from the map alone, which is exact in the middle of the picture; towards its edges
+    the standard error is off by up to a sixth.
+
+    Args:
+        ground: The map.
+        undistorted_px: (N, 2) the points without lens distortion.
+        height_sigma_m: Standard deviation of the ground's height.
+
+    Returns:
+        (N, 2, 2) metres squared; NaN where the point is.
+    """
+    covariance: FloatArray = np.full((len(undistorted_px), 2, 2), np.nan)
+    jacobian = homography.point_jacobian(ground.image_to_ground, undistorted_px)
+    usable = np.isfinite(jacobian).all(axis=(1, 2))
+    # A pixel covers most ground along the view, and least across it, by the sine of the angle at which it is seen.
+    directions, extents, _ = np.linalg.svd(jacobian[usable])
+    sine = extents[:, 1] / extents[:, 0]
+    along = directions[:, :, 0] * (height_sigma_m * np.sqrt(1.0 - sine**2) / sine)[:, None]
+    covariance[usable] = along[:, :, None] * along[:, None, :]
+    return covariance

@@ -9,7 +9,7 @@ import numpy as np
 from standoff.core.classes import CLASS_BY_NAME, CLASSES, Role
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import GroundMap, GroundPositions, IntArray, NoGroundMap, Proximities
-from standoff.stages.proximity.outliers import BoundedFilter, OutlierFilter, PaperFilter
+from standoff.stages.proximity.outliers import PaperFilter
 from standoff.stages.proximity.params import ProximityParams
 
 Pair = tuple[int, int]
@@ -28,7 +28,7 @@ class ProximityMeter:
     def __init__(self, params: ProximityParams | None = None) -> None:
         self._params = params or ProximityParams()
         self._watched = _watched_classes(self._params.pairs)
-        self._filters: dict[Pair, OutlierFilter] = {}
+        self._filters: dict[Pair, PaperFilter] = {}
 
     def update(self, time_s: float, positions: GroundPositions, ground: GroundMap | NoGroundMap) -> Proximities:
         """Measure all pairs of one frame.
@@ -46,7 +46,7 @@ class ProximityMeter:
         a, b = self._pair_rows(positions)
         offset_m = positions.xy_m[b] - positions.xy_m[a]
         measured_m = np.hypot(offset_m[:, 0], offset_m[:, 1])
-        distance_m = self._filtered(time_s, positions.track_id[a], positions.track_id[b], measured_m, ground)
+        distance_m = self._filtered(positions.track_id[a], positions.track_id[b], measured_m, ground)
         moved_m = distance_m - measured_m
         sigma_m = np.hypot(_distance_sigma(positions, a, b, offset_m, measured_m), moved_m)
         gap_m = distance_m - positions.radius_m[a] - positions.radius_m[b]
@@ -74,33 +74,23 @@ class ProximityMeter:
         return by_id[first], by_id[second]
 
     def _filtered(
-        self,
-        time_s: float,
-        track_a: IntArray,
-        track_b: IntArray,
-        distance_m: FloatArray,
-        ground: GroundMap | NoGroundMap,
+        self, track_a: IntArray, track_b: IntArray, distance_m: FloatArray, ground: GroundMap | NoGroundMap
     ) -> FloatArray:
         """Return (K,) distances after the outlier filter; NaN stays NaN and ends what was remembered."""
+        if self._params.outlier_filter == "off":
+            return distance_m
         threshold_m = self._threshold_m(ground)
-        filters: dict[Pair, OutlierFilter] = {}
+        filters: dict[Pair, PaperFilter] = {}
         filtered_m = distance_m.copy()
         for row, pair in enumerate(zip(track_a.tolist(), track_b.tolist(), strict=True)):
             if not math.isnan(distance_m[row]):
-                filters[pair] = self._filters.get(pair) or self._new_filter()
-                filtered_m[row] = filters[pair].update(time_s, float(distance_m[row]), threshold_m)
+                filters[pair] = self._filters.get(pair) or PaperFilter()
+                filtered_m[row] = filters[pair].update(float(distance_m[row]), threshold_m)
         self._filters = filters
         return filtered_m
 
-    def _new_filter(self) -> OutlierFilter:
-        if self._params.outlier_filter == "paper":
-            return PaperFilter()
-        return BoundedFilter(self._params.max_speed_mps, self._params.max_replaced_s)
-
     def _threshold_m(self, ground: GroundMap | NoGroundMap) -> float:
         """Return the outlier threshold; infinite where nothing is to be replaced."""
-        if self._params.outlier_filter == "off":
-            return math.inf
         if self._params.outlier_threshold_m is not None:
             return self._params.outlier_threshold_m
         if self._params.outlier_threshold_px is None or isinstance(ground, NoGroundMap):

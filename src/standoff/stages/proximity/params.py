@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from annotated_types import Ge, Gt, Len
+from annotated_types import Gt, Len
 from typing_extensions import Doc
 
 from standoff.core.classes import CLASS_BY_NAME
@@ -24,13 +24,12 @@ class ProximityParams:
         ),
     ] = (("worker", "equipment"),)
     outlier_filter: Annotated[
-        Literal["bounded", "paper", "off"],
+        Literal["off", "paper"],
         Doc(
             "'paper': a distance further than the threshold from the mean of the previous two estimates is replaced by "
-            "that mean, for ever if need be. 'bounded': the same, but what could really have moved so far is never "
-            "replaced, and a new level that lasts is accepted."
+            "that mean, for ever if need be. 'off': places that cannot be are left out before, by the locate stage."
         ),
-    ] = "bounded"
+    ] = "off"
     outlier_threshold_px: Annotated[
         float | None, Gt(0), Doc("The paper's threshold, in pixels of its rectified plane (Eq. 6 makes metres of it).")
     ] = 50.0
@@ -39,22 +38,6 @@ class ProximityParams:
         Gt(0),
         Doc("The threshold in metres, in place of the one in pixels. Without either nothing is an outlier."),
     ] = None
-    max_speed_mps: Annotated[
-        float,
-        Ge(0),
-        Doc(
-            "'bounded' widens the threshold by this speed times the age of the estimates. The paper's loader moves "
-            "3.4 m in 0.278 s (section 8.3), a running worker some 3 m/s towards it."
-        ),
-    ] = 15.0
-    max_replaced_s: Annotated[
-        float,
-        Gt(0),
-        Doc(
-            "'bounded' forgets estimates older than so many seconds, and so replaces for no longer. Half a second "
-            "bridges a few bad frames and never hides a machine that has come closer."
-        ),
-    ] = 0.5
 
     def __post_init__(self) -> None:
         for side in {side for pair in self.pairs for side in pair} - set(SIDES):
