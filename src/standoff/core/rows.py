@@ -43,6 +43,10 @@ class Rows:
     def __getitem__(self, mask: npt.NDArray[np.bool_] | npt.NDArray[np.int64] | slice) -> Self:
         return replace(self, **{name: getattr(self, name)[mask] for name in self._COLUMNS})  # type: ignore[type-var]
 
+    def columns(self) -> dict[str, npt.NDArray[Any]]:
+        """Return all columns by name."""
+        return {name: getattr(self, name) for name in self._COLUMNS}
+
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
         """Return the rows of several structs, one after another."""

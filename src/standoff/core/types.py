@@ -6,6 +6,7 @@ Arrays are copied and checked once, at construction, and are read-only afterward
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
@@ -266,6 +267,11 @@ class Proximities(Rows):
         time_to_contact_s: (K,) until gap_m is 0 at this closing speed, 0 when breached, inf if it never is;
             NaN while unknown.
         filtered: (K,) True where the outlier filter replaced the distance.
+        closest_m: (K,) least distance of the likeliest paths within the horizon; NaN where not measured; as the three
+            that follow, NaN also where nobody predicts.
+        closest_in_s: (K,) seconds until then.
+        breach_now: (K,) probability that the gap is negative.
+        breach_ahead: (K,) probability that it is, or will be within the horizon.
     """
 
     track_a: IntArray
@@ -276,6 +282,10 @@ class Proximities(Rows):
     closing_mps: FloatArray
     time_to_contact_s: FloatArray
     filtered: BoolArray
+    closest_m: FloatArray = field(default_factory=lambda: np.zeros(0))
+    closest_in_s: FloatArray = field(default_factory=lambda: np.zeros(0))
+    breach_now: FloatArray = field(default_factory=lambda: np.zeros(0))
+    breach_ahead: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     _COLUMNS: ClassVar[Columns] = {
         "track_a": (np.int64, ()),
@@ -286,7 +296,12 @@ class Proximities(Rows):
         "closing_mps": (np.float64, ()),
         "time_to_contact_s": (np.float64, ()),
         "filtered": (np.bool_, ()),
+        "closest_m": (np.float64, ()),
+        "closest_in_s": (np.float64, ()),
+        "breach_now": (np.float64, ()),
+        "breach_ahead": (np.float64, ()),
     }
+    _OPTIONAL: ClassVar[frozenset[str]] = frozenset({"closest_m", "closest_in_s", "breach_now", "breach_ahead"})
 
     def __post_init__(self) -> None:
         Rows.__post_init__(self)
@@ -313,6 +328,8 @@ class Hazard:
         gap_m: Distance less both action radii; NaN while unknown.
         sigma_m: Standard error of the distance; NaN while unknown.
         reason: Why it is unknown or why it closed; empty otherwise.
+        breach_now: Probability that the gap is negative; NaN while unknown.
+        breach_ahead: Probability that it is, or will be within the horizon; NaN while unknown.
     """
 
     hazard_id: str
@@ -325,6 +342,8 @@ class Hazard:
     gap_m: float
     sigma_m: float
     reason: str = ""
+    breach_now: float = math.nan
+    breach_ahead: float = math.nan
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -54,7 +54,7 @@ def test_filling_changes_no_estimate_and_follows_the_papers_filter(values: list[
     paper, follows = PaperFilter(), True
     for index, distance_m in enumerate(np.where(measured, estimate_m, 1e6)):
         follows &= bool(measured[index]) or index >= 2
-        result_m = paper.update(0.0, float(distance_m), 1e3)
+        result_m = paper.update(float(distance_m), 1e3)
         assert not follows or result_m == pytest.approx(filled_m[index])
 
 

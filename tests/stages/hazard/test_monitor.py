@@ -19,7 +19,7 @@ CUT_OFF = "cut off by the picture's edge"
 NAN = math.nan
 STEP_S = 0.125
 """A step that floating point knows exactly."""
-CALM = HazardParams(min_duration_s=0.25, release_s=0.5, update_every_s=1000.0, unknown_after_s=1.0)
+CALM = HazardParams(rule="distance", min_duration_s=0.25, release_s=0.5, update_every_s=1000.0, unknown_after_s=1.0)
 
 Pair = tuple[int, int]
 Gaps = dict[Pair, float]
@@ -117,7 +117,7 @@ def test_noise_around_the_limit_does_not_flicker() -> None:
 
 
 def test_caution_takes_the_gap_smaller_by_sigmas() -> None:
-    params = HazardParams(caution_sigmas=2.0)
+    params = HazardParams(rule="distance", caution_sigmas=2.0)
     for sigma_m, expected in ((0.1, 0), (1.0, 1)):
         monitor = HazardMonitor(params)
         events = [
@@ -127,7 +127,7 @@ def test_caution_takes_the_gap_smaller_by_sigmas() -> None:
 
 
 def test_a_cautious_monitor_cannot_measure_without_a_sigma() -> None:
-    monitor = HazardMonitor(HazardParams(caution_sigmas=2.0))
+    monitor = HazardMonitor(HazardParams(rule="distance", caution_sigmas=2.0))
     events = [e for i in range(12) for e in monitor.update(STEP_S * i, *frame({(1, 2): 9.0}, NAN), GROUND, FOLLOWED)]
     assert [(event.phase, event.severity, event.reason) for event in events] == [("opened", "unknown", "not measured")]
 
@@ -359,7 +359,9 @@ def test_a_slower_clock_with_slower_settings_tells_the_same_story(
     frames: list[Gaps | NoGroundMap], factor: float
 ) -> None:
     durations = {"min_duration_s": 0.25, "release_s": 0.5, "update_every_s": 1.0, "unknown_after_s": 1.0}
-    plain = HazardParams(**durations, unknown_timeout_s=2.0)
-    slow = HazardParams(**{name: factor * s for name, s in durations.items()}, unknown_timeout_s=2.0 * factor)
+    plain = HazardParams("distance", **durations, unknown_timeout_s=2.0)
+    slow = HazardParams(
+        "distance", **{name: factor * s for name, s in durations.items()}, unknown_timeout_s=2.0 * factor
+    )
     told_plain = [(p, s, t * factor) for p, s, t in told(events_of(frames, plain))]
     assert told(events_of(frames, slow, step_s=STEP_S * factor)) == told_plain

@@ -7,9 +7,9 @@ import pytest
 from scipy.linalg import expm
 
 from standoff.core.classes import CLASS_BY_NAME
+from standoff.core.ground_motion import MEMORY_S, SPEED_MPS, transition, wandering
 from standoff.core.homography import FloatArray
 from standoff.stages.locate.ground_filter import Filtered, GroundFilter
-from standoff.stages.locate.motion_models import MEMORY_S, SPEED_MPS, transition, wandering
 
 WORKER, LOADER = CLASS_BY_NAME["worker"].id, CLASS_BY_NAME["wheel_loader"].id
 

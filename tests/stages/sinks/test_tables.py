@@ -44,6 +44,7 @@ TRACK_COLUMNS = [
     "radius_m",
     "valid",
     "reason",
+    "sight",
 ]
 PROXIMITY_COLUMNS = [
     "stream_id",
@@ -61,6 +62,10 @@ PROXIMITY_COLUMNS = [
     "filtered",
     "measured",
     "observed",
+    "closest_m",
+    "closest_in_s",
+    "breach_now",
+    "breach_ahead",
 ]
 
 

@@ -12,11 +12,13 @@ from standoff.core.types import Hazard, Phase, Severity
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """One measurement of a pair; all NaN where there was none."""
+    """One measurement of a pair; all NaN where there was none, the probabilities also where nobody predicts."""
 
     distance_m: float
     gap_m: float
     sigma_m: float
+    breach_now: float = math.nan
+    breach_ahead: float = math.nan
 
 
 UNMEASURED = Reading(math.nan, math.nan, math.nan)
@@ -105,6 +107,8 @@ class OpenHazard:
             gap_m=reading.gap_m,
             sigma_m=reading.sigma_m,
             reason=reason,
+            breach_now=reading.breach_now,
+            breach_ahead=reading.breach_ahead,
         )
 
     def silent_s(self, time_s: float) -> float:

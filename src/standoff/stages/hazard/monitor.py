@@ -128,6 +128,8 @@ def _readings(proximities: Proximities) -> dict[Pair, Reading]:
         proximities.distance_m,
         proximities.gap_m,
         proximities.sigma_m,
+        proximities.breach_now,
+        proximities.breach_ahead,
     )
     return {(a, b): Reading(*values) for a, b, *values in zip(*(c.tolist() for c in columns), strict=True)}
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
-
 from standoff.core.types import Hazard, Severity
+from standoff.stages.hazard.levels import levels_of
 from standoff.stages.hazard.life import UNMEASURED, Latch, OpenHazard, Reading
 from standoff.stages.hazard.params import HazardParams
 
@@ -12,8 +11,8 @@ from standoff.stages.hazard.params import HazardParams
 class PairWatch:
     """Watch one pair. In each frame call exactly one of `measure`, `miss` and `lose`.
 
-    Two latches follow the gap, one per limit: near (within the buffer) and breached (negative). A
-    hazard is open while the near latch is on; a pair that cannot be measured counts as near.
+    Two latches follow what is measured, one per level: near and breached. A hazard is open while one of them is on; a
+    pair that cannot be measured counts as near.
 
     Args:
         track_ids: Smaller id first.
@@ -37,18 +36,20 @@ class PairWatch:
 
     def measurable(self, reading: Reading) -> bool:
         """Tell whether a reading says how near the pair is; NaN never does."""
-        return not math.isnan(self._cautious_gap_m(reading))
+        return levels_of(reading, self._params) is not None
 
     def measure(self, time_s: float, reading: Reading) -> Hazard | None:
         """Take a measurement and return what there is to say of it."""
         self._missing_since_s = self._lost_since_s = None
         self._reading = reading
-        gap_m = self._cautious_gap_m(reading)
-        for latch, limit_m in ((self._near, self._params.buffer_m), (self._breached, 0.0)):
-            latch.update(time_s, enters=gap_m < limit_m, leaves=gap_m > limit_m + self._params.hysteresis_m)
-        if not self._near.on:
+        levels = levels_of(reading, self._params)
+        if levels is None:
+            raise ValueError("a reading that tells nothing is a miss")
+        self._near.update(time_s, enters=levels.near.enters, leaves=levels.near.leaves)
+        self._breached.update(time_s, enters=levels.breached.enters, leaves=levels.breached.leaves)
+        if not self._near.on and not self._breached.on:
             return self.end(time_s, f"clear for {self._params.release_s:g} s")
-        severity = self._severity(gap_m)
+        severity = self._severity(clear=levels.near.leaves)
         if self._hazard is None:
             return self._open(time_s, severity)
         changed = severity != self._hazard.severity or not self._hazard.measured
@@ -71,7 +72,11 @@ class PairWatch:
             self._missing_since_s = time_s
         self._near.miss()
         self._breached.miss()
-        patience_s = self._params.min_duration_s if self._near.stirred else self._params.unknown_after_s
+        patience_s = (
+            self._params.min_duration_s
+            if self._near.stirred or self._breached.stirred
+            else self._params.unknown_after_s
+        )
         if time_s - self._missing_since_s < patience_s:
             return None
         if self._hazard is not None:
@@ -106,13 +111,8 @@ class PairWatch:
         self._hazard = OpenHazard("proximity", self._track_ids, severity)
         return self._hazard.event("opened", time_s, self._reading, reason)
 
-    def _severity(self, gap_m: float) -> Severity:
-        """Return the level while the near latch is on; unknown if it was never measured near."""
+    def _severity(self, *, clear: bool) -> Severity:
+        """Return the level while a latch is on; unknown if it was never measured near."""
         if self._breached.on:
             return "danger"
-        clear = gap_m > self._params.buffer_m + self._params.hysteresis_m
         return "unknown" if clear and self._hazard is not None and self._hazard.severity == "unknown" else "warning"
-
-    def _cautious_gap_m(self, reading: Reading) -> float:
-        caution = self._params.caution_sigmas
-        return reading.gap_m - caution * reading.sigma_m if caution > 0 else reading.gap_m

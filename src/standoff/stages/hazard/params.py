@@ -1,9 +1,9 @@
 """Settings of the hazard stage."""
 
 from dataclasses import dataclass, fields
-from typing import Annotated
+from typing import Annotated, Literal
 
-from annotated_types import Ge
+from annotated_types import Ge, Interval
 from typing_extensions import Doc
 
 
@@ -11,24 +11,41 @@ from typing_extensions import Doc
 class HazardParams:
     """How near is too near, for how long, and when to say so.
 
-    The gap is the distance less both action radii, so it is danger when it is negative (the circles
-    touch) and a warning when it is less than the buffer.
+    The gap is the distance less both action radii, so it is danger when it is negative: the circles touch.
     """
 
+    rule: Annotated[
+        Literal["probability", "distance"],
+        Doc(
+            "'probability': a warning when the circles will likely touch within the horizon (`proximity.horizon_s`), "
+            "danger when they likely do now. 'distance', the paper's: a warning when the gap is less than `buffer_m`, "
+            "danger when it is negative."
+        ),
+    ] = "probability"
+    warning_probability: Annotated[
+        float, Interval(gt=0, lt=1), Doc("How likely a breach within the horizon must be for a warning.")
+    ] = 0.3
+    danger_probability: Annotated[float, Interval(gt=0, lt=1), Doc("How likely a breach now must be for danger.")] = 0.5
     buffer_m: Annotated[
         float,
         Ge(0),
-        Doc("Warn when the gap is less than so many metres; the paper's suggestion to absorb the measurement error."),
+        Doc(
+            "By distance, warn when the gap is less than so many metres; the paper's suggestion to absorb the measurement error."
+        ),
     ] = 1.0
     caution_sigmas: Annotated[
         float,
         Ge(0),
-        Doc("Take the gap to be smaller by so many of its standard errors; 0 takes it as measured, as the paper does."),
+        Doc(
+            "By distance, take the gap to be smaller by so many of its standard errors; 0 takes it as measured, as the paper does."
+        ),
     ] = 0.0
     hysteresis_m: Annotated[
         float,
         Ge(0),
-        Doc("A level ends when the gap exceeds its limit by so many metres: noise of half a metre does not flicker."),
+        Doc(
+            "By distance, a level ends when the gap exceeds its limit by so many metres: noise of half a metre does not flicker."
+        ),
     ] = 0.5
     min_duration_s: Annotated[
         float,
@@ -57,5 +74,5 @@ class HazardParams:
         for setting in fields(self):
             value = getattr(self, setting.name)
             # Not a bound to be left to the configuration: no gap is less than NaN, so it would switch the alarm off.
-            if not value >= 0:
+            if not isinstance(value, str) and not value >= 0:
                 raise ValueError(f"{setting.name} must be a number from 0, not {value}")

@@ -13,9 +13,9 @@ from typing import Final
 
 import numpy as np
 
+from standoff.core.ground_motion import SPEED_MPS, transition, wandering
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import IntArray
-from standoff.stages.locate.motion_models import SPEED_MPS, transition, wandering
 
 _GATE: Final = 18.4
 """Squared distance, in standard errors, that one in 10,000 right places exceeds: chi-square, two degrees of freedom."""
@@ -89,7 +89,7 @@ class GroundFilter:
         if math.isfinite(self._time_s):
             self._predict(time_s - self._time_s)
         self._time_s = time_s
-        seen = np.isfinite(xy_m).all(axis=1)
+        seen: BoolArray = np.asarray(np.isfinite(xy_m).all(axis=1))
         fresh = seen & ~np.isfinite(self._rows["seen_s"])
         self._start(fresh, xy_m, noise_m2)
         known = np.flatnonzero(seen & ~fresh)

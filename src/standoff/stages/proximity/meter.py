@@ -11,6 +11,7 @@ from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import GroundMap, GroundPositions, IntArray, NoGroundMap, Proximities
 from standoff.stages.proximity.outliers import PaperFilter
 from standoff.stages.proximity.params import ProximityParams
+from standoff.stages.proximity.prediction import predict
 
 Pair = tuple[int, int]
 
@@ -49,7 +50,9 @@ class ProximityMeter:
         distance_m = self._filtered(positions.track_id[a], positions.track_id[b], measured_m, ground)
         moved_m = distance_m - measured_m
         sigma_m = np.hypot(_distance_sigma(positions, a, b, offset_m, measured_m), moved_m)
-        gap_m = distance_m - positions.radius_m[a] - positions.radius_m[b]
+        reach_m = positions.radius_m[a] + positions.radius_m[b]
+        gap_m = distance_m - reach_m
+        ahead = predict(positions, a, b, reach_m, self._params.horizon_s)
         closing_mps = _closing_speed(positions.velocity_mps[b] - positions.velocity_mps[a], offset_m, measured_m)
         return Proximities(
             track_a=positions.track_id[a],
@@ -59,6 +62,7 @@ class ProximityMeter:
             sigma_m=sigma_m,
             closing_mps=closing_mps,
             time_to_contact_s=time_to_contact(gap_m, closing_mps),
+            **ahead._asdict(),
             filtered=np.abs(moved_m) > 0.0,
         )
 

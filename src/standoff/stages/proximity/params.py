@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from annotated_types import Gt, Len
+from annotated_types import Gt, Interval, Len
 from typing_extensions import Doc
 
 from standoff.core.classes import CLASS_BY_NAME
@@ -23,6 +23,11 @@ class ProximityParams:
             "with that role, or 'any' for both roles. The order of the sides does not matter."
         ),
     ] = (("worker", "equipment"),)
+    horizon_s: Annotated[
+        float,
+        Interval(ge=1, le=5),
+        Doc("How far ahead it is asked whether two action radii will touch, in seconds."),
+    ] = 3.0
     outlier_filter: Annotated[
         Literal["off", "paper"],
         Doc(

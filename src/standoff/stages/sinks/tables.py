@@ -51,8 +51,9 @@ _TRACK_COLUMNS = (
     ("sigma_y_m", pa.float64(), "m", "standard error of y_m"),
     ("cov_xy_m2", pa.float64(), "m^2", "covariance of x_m and y_m"),
     ("radius_m", pa.float64(), "m", "action radius"),
-    ("valid", pa.bool_(), "", "whether the position was measured"),
+    ("valid", pa.bool_(), "", "whether there is a position"),
     ("reason", pa.string(), "", "why not; empty where valid"),
+    ("sight", pa.string(), "", "observed; hidden: looked for and not found; predicted: not looked for; unknown"),
 )
 _PROXIMITY_COLUMNS = (
     *_FRAME_COLUMNS,
@@ -68,6 +69,10 @@ _PROXIMITY_COLUMNS = (
     ("filtered", pa.bool_(), "", "true: the outlier filter replaced the distance"),
     ("measured", pa.bool_(), "", "false: the distance is unknown, which is not the same as far away"),
     ("observed", pa.bool_(), "", "false: at least one of the two is predicted, no detection supports it in this frame"),
+    ("closest_m", pa.float64(), "m", "least distance of the likeliest paths within the horizon; null: not measured"),
+    ("closest_in_s", pa.float64(), "s", "until then; null where not measured"),
+    ("breach_now", pa.float64(), "", "probability that the gap is negative; null where not measured"),
+    ("breach_ahead", pa.float64(), "", "probability that it is, or will be within the horizon; null: not measured"),
 )
 _FRAMES_COLUMNS = (
     *_FRAME_COLUMNS,
@@ -150,9 +155,19 @@ def _track_rows(result: FrameResult) -> Columns:
         "sigma_y_m": np.sqrt(variance[:, 1, 1]),
         "cov_xy_m2": variance[:, 0, 1],
         "radius_m": positions.radius_m,
+        "sight": _sight(result),
         "valid": positions.valid,
         "reason": positions.reason,
     }
+
+
+def _sight(result: FrameResult) -> TextArray:
+    """Return (M,) what each position rests on; a track that is seen, but not well enough, is predicted."""
+    positions = result.positions
+    hidden = result.detected & ~result.tracks.observed
+    sight: TextArray = np.where(positions.predicted, np.where(hidden, "hidden", "predicted"), "observed").astype(object)
+    sight[~positions.valid] = "unknown"
+    return sight
 
 
 def _box_columns(xyxy_px: FloatArray) -> dict[str, FloatArray]:
@@ -176,10 +191,9 @@ def _classes_of(track_id: IntArray, result: FrameResult) -> TextArray:
 
 def _proximity_rows(result: FrameResult) -> Columns:
     pairs = result.proximities
-    names = ("track_a", "track_b", "distance_m", "gap_m", "sigma_m", "closing_mps", "time_to_contact_s", "filtered")
     return {
         **_frame_columns(result, len(pairs)),
-        **{name: getattr(pairs, name) for name in names},
+        **pairs.columns(),
         "class_a": _classes_of(pairs.track_a, result),
         "class_b": _classes_of(pairs.track_b, result),
         "measured": np.isfinite(pairs.distance_m),

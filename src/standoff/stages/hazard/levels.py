@@ -1,0 +1,58 @@
+"""Which of the two levels a reading of a pair speaks for: near, and breached."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from standoff.stages.hazard.life import Reading
+from standoff.stages.hazard.params import HazardParams
+
+_RELEASE = 0.5
+"""A level that a probability began ends at this share of it."""
+
+
+class Level(NamedTuple):
+    """What a reading says of one level.
+
+    Attributes:
+        enters: It holds.
+        leaves: It surely does not; neither is between the two limits of a hysteresis.
+    """
+
+    enters: bool
+    leaves: bool
+
+
+class Levels(NamedTuple):
+    """Both levels.
+
+    Attributes:
+        near: Warning.
+        breached: Danger.
+    """
+
+    near: Level
+    breached: Level
+
+
+def levels_of(reading: Reading, params: HazardParams) -> Levels | None:
+    """Return both levels; None where the reading tells nothing.
+
+    Where nobody predicts, the distance decides.
+    """
+    gap_m = reading.gap_m
+    if params.caution_sigmas > 0:
+        gap_m -= params.caution_sigmas * reading.sigma_m
+    if math.isnan(gap_m):
+        return None
+    if params.rule == "probability" and not math.isnan(reading.breach_ahead):
+        return Levels(
+            _above(reading.breach_ahead, params.warning_probability),
+            _above(reading.breach_now, params.danger_probability),
+        )
+    return Levels(*(Level(gap_m < limit, gap_m > limit + params.hysteresis_m) for limit in (params.buffer_m, 0.0)))
+
+
+def _above(probability: float, limit: float) -> Level:
+    return Level(probability >= limit, probability < _RELEASE * limit)
