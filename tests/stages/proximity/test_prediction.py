@@ -47,7 +47,7 @@ def by_small_steps(positions: GroundPositions, reach_m: float, horizon_s: float,
         places.append(state[:, :2])
         velocities.append(state[:, 2:])
     touched = np.zeros(count, dtype=bool)
-    for k in range(round(horizon_s / step_s) + 1):
+    for _ in range(round(horizon_s / step_s) + 1):
         touched |= np.linalg.norm(places[1] - places[0], axis=1) < reach_m
         for row in (0, 1):
             memory_s, speed = MEMORY_S[positions.class_id[row]], SPEED_MPS[positions.class_id[row]]

@@ -30,21 +30,24 @@ class HazardParams:
         float,
         Ge(0),
         Doc(
-            "By distance, warn when the gap is less than so many metres; the paper's suggestion to absorb the measurement error."
+            "By distance, warn when the gap is less than so many metres; the paper's suggestion to absorb the measurement "
+            "error."
         ),
     ] = 1.0
     caution_sigmas: Annotated[
         float,
         Ge(0),
         Doc(
-            "By distance, take the gap to be smaller by so many of its standard errors; 0 takes it as measured, as the paper does."
+            "By distance, take the gap to be smaller by so many of its standard errors; 0 takes it as measured, as the "
+            "paper does."
         ),
     ] = 0.0
     hysteresis_m: Annotated[
         float,
         Ge(0),
         Doc(
-            "By distance, a level ends when the gap exceeds its limit by so many metres: noise of half a metre does not flicker."
+            "By distance, a level ends when the gap exceeds its limit by so many metres: noise of half a metre does not "
+            "flicker."
         ),
     ] = 0.5
     min_duration_s: Annotated[
