@@ -30,8 +30,8 @@ class HazardParams:
         float,
         Ge(0),
         Doc(
-            "By distance, warn when the gap is less than so many metres; the paper's suggestion to absorb the measurement "
-            "error."
+            "By distance, warn when the gap is less than so many metres; the paper's suggestion to absorb the "
+            "measurement error."
         ),
     ] = 1.0
     caution_sigmas: Annotated[
@@ -46,8 +46,8 @@ class HazardParams:
         float,
         Ge(0),
         Doc(
-            "By distance, a level ends when the gap exceeds its limit by so many metres: noise of half a metre does not "
-            "flicker."
+            "By distance, a level ends when the gap exceeds its limit by so many metres: noise of half a metre does "
+            "not flicker."
         ),
     ] = 0.5
     min_duration_s: Annotated[
