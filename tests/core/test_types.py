@@ -27,6 +27,7 @@ _ROWS: dict[type[Any], dict[str, Any]] = {
         "state_covariance": np.zeros((2, 4, 4)),
         "map_factor_m": np.zeros((2, 2, 10)),
         "predicted": [False, False],
+        "standing_s": [0.0, np.nan],
         "radius_m": [2.0, 12.1],
         "valid": [True, False],
         "reason": ["", "beyond the horizon"],

@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from standoff.core.classes import CLASSES
+from standoff.core.classes import CLASSES, Role
 from standoff.core.homography import FloatArray
 from standoff.core.types import IntArray
 
@@ -38,6 +38,9 @@ SPEED_MPS: Final = np.array([_MOTION_OF[site_class.name].speed_mps for site_clas
 """(C,) standard deviation of each coordinate's velocity, by class."""
 MEMORY_S: Final = np.array([_MOTION_OF[site_class.name].memory_s for site_class in CLASSES])
 """(C,) after so many seconds a third of a velocity is left, by class."""
+_IS_MACHINE: Final = np.array([site_class.role is Role.EQUIPMENT for site_class in CLASSES])
+_STANDING_S, _STARTING_SHARE = 2.0, 0.4
+"""A machine that stood for so long gets no further in three seconds than some metre, other than one that drives."""
 
 
 def transition(class_id: IntArray, step_s: float) -> FloatArray:
@@ -55,14 +58,17 @@ def transition(class_id: IntArray, step_s: float) -> FloatArray:
     return matrix
 
 
-def wandering(class_id: IntArray, step_s: float) -> FloatArray:
+def wandering(class_id: IntArray, step_s: float, standing_s: FloatArray | None = None) -> FloatArray:
     """Return (N, 4, 4) covariance that x, y, vx and vy gain.
 
     Args:
         class_id: (N,) ids of `CLASSES`.
         step_s: Not negative.
+        standing_s: (N,) for how long each has not moved: machines that stand start slowly. Left out: all move.
     """
     memory_s, variance = MEMORY_S[class_id], SPEED_MPS[class_id] ** 2
+    if standing_s is not None:
+        variance = np.where((standing_s >= _STANDING_S) & _IS_MACHINE[class_id], _STARTING_SHARE**2, 1.0) * variance
     steps = step_s / memory_s
     left = np.exp(-steps)
     matrix = np.zeros((len(class_id), 4, 4))

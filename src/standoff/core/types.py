@@ -212,6 +212,7 @@ class GroundPositions(Rows):
         map_factor_m: (M, 2, 10) the map's share F: covariance F_i F_i^T, and F_i F_j^T between two entities,
             because all of a frame's positions lean on the same map; NaN where invalid.
         predicted: (M,) True where the position was not measured in this frame.
+        standing_s: (M,) for how long it has not moved; NaN while unknown.
         radius_m: (M,) action radius.
         valid: (M,).
         reason: (M,) text; empty where valid.
@@ -224,6 +225,7 @@ class GroundPositions(Rows):
     state_covariance: FloatArray
     map_factor_m: FloatArray
     predicted: BoolArray
+    standing_s: FloatArray
     radius_m: FloatArray
     valid: BoolArray
     reason: TextArray
@@ -236,6 +238,7 @@ class GroundPositions(Rows):
         "state_covariance": (np.float64, (4, 4)),
         "map_factor_m": (np.float64, (2, 10)),
         "predicted": (np.bool_, ()),
+        "standing_s": (np.float64, ()),
         "radius_m": (np.float64, ()),
         "valid": (np.bool_, ()),
         "reason": (np.object_, ()),

@@ -39,6 +39,7 @@ def frame(gaps: Gaps, sigma_m: float = 0.1, order: Sequence[int] | None = None) 
         state_covariance=np.zeros((count, 4, 4)),
         map_factor_m=np.zeros((count, 2, 10)),
         predicted=np.zeros(count, dtype=np.bool_),
+        standing_s=np.zeros(count),
         radius_m=np.zeros(count),
         valid=valid,
         reason=np.where(valid, "", CUT_OFF).astype(object),

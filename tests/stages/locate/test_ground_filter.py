@@ -112,3 +112,12 @@ def test_the_order_of_tracks_changes_nothing_and_those_that_end_are_forgotten() 
     assert np.isfinite(only.mean).all()
     returned = one.update(0.6, ids, classes, np.full((3, 2), np.nan), noise, noise, noise)
     assert np.isfinite(returned.mean[:, 0]).tolist() == [True, False, False]
+
+
+def test_who_stays_within_its_error_stands_and_who_walks_does_not() -> None:
+    rng, one = np.random.default_rng(4), GroundFilter()
+    for k in range(60):
+        places_m = np.array([[0.0, 0.0], [1.4 * 0.1 * k, 0.0]]) + 0.1 * rng.normal(size=(2, 2))
+        found = step(one, 0.1 * k, places_m, 0.1)
+    assert found.standing_s[0] > 5.0
+    assert found.standing_s[1] < 1.0

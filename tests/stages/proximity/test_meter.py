@@ -42,6 +42,7 @@ def positions_of(
         state_covariance=state,
         map_factor_m=factor_m,
         predicted=np.zeros(count, dtype=np.bool_),
+        standing_s=np.zeros(count),
         radius_m=np.array([CLASSES[i].action_radius_m for i in class_id]),
         valid=valid,
         reason=np.where(valid, "", "beyond the horizon").astype(object),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import ncx2
@@ -29,7 +31,18 @@ def pair(
 ) -> GroundPositions:
     rows = positions_of([(0.0, 0.0), offset_m], [*classes], velocity_mps=np.array(velocities_mps))
     state = np.tile(np.diag([place_m**2] * 2 + [speed_mps**2] * 2), (2, 1, 1))
-    names = ("track_id", "class_id", "xy_m", "velocity_mps", "map_factor_m", "predicted", "radius_m", "valid", "reason")
+    names = (
+        "track_id",
+        "class_id",
+        "xy_m",
+        "velocity_mps",
+        "map_factor_m",
+        "predicted",
+        "standing_s",
+        "radius_m",
+        "valid",
+        "reason",
+    )
     return GroundPositions(**{name: getattr(rows, name) for name in names}, state_covariance=state)
 
 
@@ -125,7 +138,17 @@ def test_an_error_that_both_share_makes_no_breach_more_likely() -> None:
     apart = pair((9.5, 0.0), place_m=0.05, speed_mps=0.05)
 
     def with_map(map_factor_m: FloatArray) -> float:
-        names = ("track_id", "class_id", "xy_m", "velocity_mps", "predicted", "radius_m", "valid", "reason")
+        names = (
+            "track_id",
+            "class_id",
+            "xy_m",
+            "velocity_mps",
+            "predicted",
+            "standing_s",
+            "radius_m",
+            "valid",
+            "reason",
+        )
         kept = {name: getattr(apart, name) for name in (*names, "state_covariance")}
         return float(predicted(GroundPositions(**kept, map_factor_m=map_factor_m), 7.8).breach_now[0])
 
@@ -144,3 +167,11 @@ def test_what_is_not_measured_is_not_predicted() -> None:
     positions = positions_of([(0.0, 0.0), (np.nan, np.nan)], [WORKER, LOADER])
     found = predict(positions, FIRST, SECOND, np.array([7.8]), 3.0)
     assert all(np.isnan(column).all() for column in found)
+
+
+def test_a_machine_that_stands_will_less_likely_be_elsewhere_soon() -> None:
+    moves = pair((9.5, 0.0))
+    stands = replace(moves, standing_s=np.array([0.0, 10.0]))
+    assert predicted(stands, 7.8).breach_ahead[0] < 0.7 * predicted(moves, 7.8).breach_ahead[0]
+    worker_stands = replace(moves, standing_s=np.array([10.0, 0.0]))
+    assert predicted(worker_stands, 7.8).breach_ahead[0] == predicted(moves, 7.8).breach_ahead[0]

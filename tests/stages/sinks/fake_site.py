@@ -175,6 +175,7 @@ class FakeSite:
             state_covariance=covariance,
             map_factor_m=np.where(nan[:, None, None], np.nan, np.zeros((len(xy), 2, 10))),
             predicted=np.zeros(len(xy), dtype=bool),
+            standing_s=np.zeros(len(xy)),
             radius_m=np.array([CLASSES[c].action_radius_m for c in self.class_id.tolist()]),
             valid=valid,
             reason=np.where(valid, "", "no ground map" if lost else "outside the trusted area").astype(object),

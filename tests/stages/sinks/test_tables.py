@@ -44,6 +44,7 @@ TRACK_COLUMNS = [
     "radius_m",
     "valid",
     "reason",
+    "standing_s",
     "sight",
 ]
 PROXIMITY_COLUMNS = [

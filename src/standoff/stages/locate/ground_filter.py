@@ -23,6 +23,8 @@ _DOUBT_S: Final = 0.3 - 1e-6
 """A place that goes on to be so far off is a new one, not an error; times are rounded."""
 _KNOWN_SHARE: Final = 0.7
 """A velocity is told once its standard error is less than so much of what its class would have anyway."""
+_STEP_M, _MOVED_SIGMAS = 0.5, 3.0
+"""Whoever is nearer to where it was stands."""
 _LEAST_NOISE_M2: Final = 1e-6
 """No place is seen to better than a millimetre."""
 _ROW = np.dtype(
@@ -32,6 +34,8 @@ _ROW = np.dtype(
         ("mean", np.float64, (4,)),
         ("covariance", np.float64, (4, 4)),
         ("lasting_m2", np.float64, (2, 2)),
+        ("stood_m", np.float64, (2,)),
+        ("stood_s", np.float64),
         ("seen_s", np.float64),
         ("doubted_s", np.float64),
     ]
@@ -46,12 +50,14 @@ class Filtered:
         mean: (M, 4) x, y in metres, vx, vy in metres per second; NaN before anything was seen.
         covariance: (M, 4, 4) of the whole of their errors but what all tracks share; NaN likewise.
         seen_s: (M,) when the place was last taken in; minus infinity before.
+        standing_s: (M,) for how long it has not moved; NaN before anything was seen.
         velocity_known: (M,) whether the velocity is more than its class's usual one.
     """
 
     mean: FloatArray
     covariance: FloatArray
     seen_s: FloatArray
+    standing_s: FloatArray
     velocity_known: BoolArray
 
 
@@ -101,6 +107,7 @@ class GroundFilter:
         again = np.zeros(len(seen), dtype=np.bool_)
         again[doubted] = time_s - self._rows["doubted_s"][doubted] >= _DOUBT_S
         self._start(again, xy_m, noise_m2)
+        self._stand()
         taken = self._rows["seen_s"] == time_s
         self._rows["lasting_m2"][taken] = lasting_m2[taken]
         return self._filtered()
@@ -108,7 +115,9 @@ class GroundFilter:
     def _follow(self, track_id: IntArray, class_id: IntArray) -> None:
         """Bring the rows into the order of the tracks; new ones know nothing."""
         rows = np.zeros(len(track_id), _ROW)
-        rows["mean"], rows["covariance"], rows["doubted_s"], rows["seen_s"] = np.nan, np.nan, np.nan, -np.inf
+        for name in ("mean", "covariance", "stood_m", "stood_s", "doubted_s"):
+            rows[name] = np.nan
+        rows["seen_s"] = -np.inf
         _, ours, theirs = np.intersect1d(track_id, self._rows["track_id"], return_indices=True)
         rows[ours] = self._rows[theirs]
         rows["track_id"], rows["class_id"] = track_id, class_id
@@ -118,7 +127,7 @@ class GroundFilter:
         rows = self._rows
         forth = transition(rows["class_id"], step_s)
         rows["mean"] = (forth @ rows["mean"][:, :, None])[:, :, 0]
-        gained = wandering(rows["class_id"], step_s)
+        gained = wandering(rows["class_id"], step_s, self._time_s - rows["stood_s"])
         rows["covariance"] = forth @ rows["covariance"] @ forth.transpose(0, 2, 1) + gained
 
     def _start(self, which: BoolArray, xy_m: FloatArray, noise_m2: FloatArray) -> None:
@@ -149,10 +158,19 @@ class GroundFilter:
         rows["seen_s"], rows["doubted_s"] = self._time_s, np.nan
         self._rows[which] = rows
 
+    def _stand(self) -> None:
+        """Remember since when each track is where it is; one that went further than its error allows has moved."""
+        rows = self._rows
+        spread_m2 = rows["covariance"][:, 0, 0] + rows["covariance"][:, 1, 1]
+        moved_m = np.linalg.norm(rows["mean"][:, :2] - rows["stood_m"], axis=1)
+        stands = moved_m <= np.maximum(_STEP_M, _MOVED_SIGMAS * np.sqrt(spread_m2))
+        rows["stood_m"][~stands] = rows["mean"][~stands, :2]
+        rows["stood_s"][~stands] = self._time_s
+
     def _filtered(self) -> Filtered:
         rows = self._rows
         largest = np.sqrt(np.maximum(rows["covariance"][:, 2, 2], rows["covariance"][:, 3, 3]))
         known = largest < _KNOWN_SHARE * SPEED_MPS[rows["class_id"]]
         covariance = rows["covariance"].copy()
         covariance[:, :2, :2] += rows["lasting_m2"]
-        return Filtered(rows["mean"].copy(), covariance, rows["seen_s"].copy(), known)
+        return Filtered(rows["mean"].copy(), covariance, rows["seen_s"].copy(), self._time_s - rows["stood_s"], known)

@@ -115,6 +115,7 @@ class _Side(NamedTuple):
         velocity: In metres per second; 0 where it is unknown.
         covariance: (K, 4, 4) of both.
         class_id: For its motion.
+        standing_s: For how long it has not moved.
         left: Of a velocity after a step.
         travelled: Seconds for which a velocity carries in a step.
         noise: (K, 3) what a step adds: place from the first number that is drawn, velocity from the first and second.
@@ -124,6 +125,7 @@ class _Side(NamedTuple):
     velocity: _ComplexArray
     covariance: FloatArray
     class_id: IntArray
+    standing_s: FloatArray
     left: FloatArray
     travelled: FloatArray
     noise: FloatArray
@@ -131,7 +133,8 @@ class _Side(NamedTuple):
     @classmethod
     def of(cls, positions: GroundPositions, rows: IntArray) -> _Side:
         class_id = positions.class_id[rows]
-        forth, gained = transition(class_id, STEP_S), wandering(class_id, STEP_S)
+        standing_s = positions.standing_s[rows]
+        forth, gained = transition(class_id, STEP_S), wandering(class_id, STEP_S, standing_s)
         by_first = np.sqrt(gained[:, 0, 0])
         both = gained[:, 0, 2] / by_first
         rest = np.sqrt(np.maximum(gained[:, 2, 2] - both**2, 0.0))
@@ -141,6 +144,7 @@ class _Side(NamedTuple):
             velocity[:, 0] + 1j * velocity[:, 1],
             positions.state_covariance[rows],
             class_id,
+            standing_s,
             forth[:, 2, 2],
             forth[:, 0, 2],
             np.column_stack([by_first, both, rest]),
@@ -149,7 +153,8 @@ class _Side(NamedTuple):
     def some(self, which: IntArray) -> _Side:
         """Return some of the pairs."""
         return _Side(
-            self.place[which], self.velocity[which], self.covariance[which], self.class_id[which], self.left[which],
+            self.place[which], self.velocity[which], self.covariance[which], self.class_id[which],
+            self.standing_s[which], self.left[which],
             self.travelled[which], self.noise[which],
         )  # fmt: skip
 
@@ -161,7 +166,8 @@ class _Side(NamedTuple):
 
     def spread_m2(self, steps: int) -> FloatArray:
         """Return (K,) variance of the place after all steps, summed over both coordinates."""
-        forth, gained = transition(self.class_id, steps * STEP_S), wandering(self.class_id, steps * STEP_S)
+        forth = transition(self.class_id, steps * STEP_S)
+        gained = wandering(self.class_id, steps * STEP_S, self.standing_s)
         covariance = forth @ self.covariance @ forth.transpose(0, 2, 1) + gained
         spread: FloatArray = covariance[:, 0, 0] + covariance[:, 1, 1]
         return spread

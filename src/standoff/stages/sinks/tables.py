@@ -53,6 +53,7 @@ _TRACK_COLUMNS = (
     ("radius_m", pa.float64(), "m", "action radius"),
     ("valid", pa.bool_(), "", "whether there is a position"),
     ("reason", pa.string(), "", "why not; empty where valid"),
+    ("standing_s", pa.float64(), "s", "for how long it has not moved; null while unknown"),
     ("sight", pa.string(), "", "observed; hidden: looked for and not found; predicted: not looked for; unknown"),
 )
 _PROXIMITY_COLUMNS = (
@@ -155,6 +156,7 @@ def _track_rows(result: FrameResult) -> Columns:
         "sigma_y_m": np.sqrt(variance[:, 1, 1]),
         "cov_xy_m2": variance[:, 0, 1],
         "radius_m": positions.radius_m,
+        "standing_s": positions.standing_s,
         "sight": _sight(result),
         "valid": positions.valid,
         "reason": positions.reason,
