@@ -19,14 +19,14 @@ class Rows:
     __slots__ = ()
     _COLUMNS: ClassVar[Columns]
     _OPTIONAL: ClassVar[frozenset[str]] = frozenset()
-    """Columns of numbers after the first that may be left out, empty: then they are NaN in every row."""
+    """Columns after the first that may be left out, empty: then numbers are NaN and texts empty in every row."""
 
     def __post_init__(self) -> None:
         count: int | None = None
         for name, (dtype, tail) in self._COLUMNS.items():
             column: npt.NDArray[Any] = np.array(getattr(self, name), dtype=dtype)
             if column.size == 0 and count and name in self._OPTIONAL:
-                column = np.full((count, *tail), np.nan)
+                column = np.full((count, *tail), "" if dtype is np.object_ else np.nan, dtype=dtype)
             if column.size == 0:
                 column = column.reshape(0, *tail)
             if column.shape[1:] != tail or column.ndim != 1 + len(tail):

@@ -275,6 +275,7 @@ class Proximities(Rows):
         closest_in_s: (K,) seconds until then.
         breach_now: (K,) probability that the gap is negative.
         breach_ahead: (K,) probability that it is, or will be within the horizon.
+        excuse: (K,) text, why the pair is no hazard however near; empty where it may be one.
     """
 
     track_a: IntArray
@@ -289,6 +290,7 @@ class Proximities(Rows):
     closest_in_s: FloatArray = field(default_factory=lambda: np.zeros(0))
     breach_now: FloatArray = field(default_factory=lambda: np.zeros(0))
     breach_ahead: FloatArray = field(default_factory=lambda: np.zeros(0))
+    excuse: TextArray = field(default_factory=lambda: np.zeros(0, dtype=object))
 
     _COLUMNS: ClassVar[Columns] = {
         "track_a": (np.int64, ()),
@@ -303,8 +305,11 @@ class Proximities(Rows):
         "closest_in_s": (np.float64, ()),
         "breach_now": (np.float64, ()),
         "breach_ahead": (np.float64, ()),
+        "excuse": (np.object_, ()),
     }
-    _OPTIONAL: ClassVar[frozenset[str]] = frozenset({"closest_m", "closest_in_s", "breach_now", "breach_ahead"})
+    _OPTIONAL: ClassVar[frozenset[str]] = frozenset(
+        {"closest_m", "closest_in_s", "breach_now", "breach_ahead", "excuse"}
+    )
 
     def __post_init__(self) -> None:
         Rows.__post_init__(self)

@@ -48,3 +48,9 @@ def test_what_was_not_measured_speaks_for_neither(params: HazardParams) -> None:
 def test_a_probability_that_is_none_is_refused(name: str, value: float) -> None:
     with pytest.raises(ValueError, match=name):
         HazardParams(**{name: value})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("params", [PROBABLE, DISTANT])
+def test_an_excused_pair_is_clear_however_near(params: HazardParams) -> None:
+    levels = levels_of(Reading(1.0, -6.8, 0.2, 1.0, 1.0, "the machine is parked"), params)
+    assert levels == ((False, True), (False, True))

@@ -67,6 +67,7 @@ PROXIMITY_COLUMNS = [
     "closest_in_s",
     "breach_now",
     "breach_ahead",
+    "excuse",
 ]
 
 

@@ -39,13 +39,15 @@ class Levels(NamedTuple):
 def levels_of(reading: Reading, params: HazardParams) -> Levels | None:
     """Return both levels; None where the reading tells nothing.
 
-    Where nobody predicts, the distance decides.
+    An excused pair is clear. Where nobody predicts, the distance decides.
     """
     gap_m = reading.gap_m
     if params.caution_sigmas > 0:
         gap_m -= params.caution_sigmas * reading.sigma_m
     if math.isnan(gap_m):
         return None
+    if reading.excuse:
+        return Levels(Level(False, True), Level(False, True))
     if params.rule == "probability" and not math.isnan(reading.breach_ahead):
         return Levels(
             _above(reading.breach_ahead, params.warning_probability),

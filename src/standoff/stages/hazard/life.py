@@ -12,13 +12,14 @@ from standoff.core.types import Hazard, Phase, Severity
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """One measurement of a pair; all NaN where there was none, the probabilities also where nobody predicts."""
+    """One measurement of a pair: why it is no hazard, if so, and numbers, NaN where there are none."""
 
     distance_m: float
     gap_m: float
     sigma_m: float
     breach_now: float = math.nan
     breach_ahead: float = math.nan
+    excuse: str = ""
 
 
 UNMEASURED = Reading(math.nan, math.nan, math.nan)

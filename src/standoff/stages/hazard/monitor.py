@@ -130,6 +130,7 @@ def _readings(proximities: Proximities) -> dict[Pair, Reading]:
         proximities.sigma_m,
         proximities.breach_now,
         proximities.breach_ahead,
+        proximities.excuse,
     )
     return {(a, b): Reading(*values) for a, b, *values in zip(*(c.tolist() for c in columns), strict=True)}
 

@@ -48,7 +48,7 @@ class PairWatch:
         self._near.update(time_s, enters=levels.near.enters, leaves=levels.near.leaves)
         self._breached.update(time_s, enters=levels.breached.enters, leaves=levels.breached.leaves)
         if not self._near.on and not self._breached.on:
-            return self.end(time_s, f"clear for {self._params.release_s:g} s")
+            return self.end(time_s, reading.excuse or f"clear for {self._params.release_s:g} s")
         severity = self._severity(clear=levels.near.leaves)
         if self._hazard is None:
             return self._open(time_s, severity)

@@ -9,6 +9,7 @@ import numpy as np
 from standoff.core.classes import CLASS_BY_NAME, CLASSES, Role
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import GroundMap, GroundPositions, IntArray, NoGroundMap, Proximities
+from standoff.stages.proximity.excuses import Excuses
 from standoff.stages.proximity.outliers import PaperFilter
 from standoff.stages.proximity.params import ProximityParams
 from standoff.stages.proximity.prediction import predict
@@ -30,6 +31,7 @@ class ProximityMeter:
         self._params = params or ProximityParams()
         self._watched = _watched_classes(self._params.pairs)
         self._filters: dict[Pair, PaperFilter] = {}
+        self._excuses = Excuses(self._params)
 
     def update(self, time_s: float, positions: GroundPositions, ground: GroundMap | NoGroundMap) -> Proximities:
         """Measure all pairs of one frame.
@@ -63,12 +65,14 @@ class ProximityMeter:
             closing_mps=closing_mps,
             time_to_contact_s=time_to_contact(gap_m, closing_mps),
             **ahead._asdict(),
+            excuse=self._excuses.update(positions, a, b, measured_m),
             filtered=np.abs(moved_m) > 0.0,
         )
 
     def reset(self) -> None:
         """Forget all pairs."""
         self._filters = {}
+        self._excuses = Excuses(self._params)
 
     def _pair_rows(self, positions: GroundPositions) -> tuple[IntArray, IntArray]:
         """Return the rows of both tracks of each configured pair, smaller id first, sorted by ids."""

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from annotated_types import Gt, Interval, Len
+from annotated_types import Ge, Gt, Interval, Len
 from typing_extensions import Doc
 
 from standoff.core.classes import CLASS_BY_NAME
@@ -23,6 +23,22 @@ class ProximityParams:
             "with that role, or 'any' for both roles. The order of the sides does not matter."
         ),
     ] = (("worker", "equipment"),)
+    parked_after_s: Annotated[
+        float | None,
+        Ge(0),
+        Doc(
+            "A machine that has not moved for so many seconds is parked: near it there is no hazard until it moves. "
+            "Never an excavator, which stands while it swings. null: no machine is ever parked."
+        ),
+    ] = 60.0
+    cabs: Annotated[
+        bool,
+        Doc("Whoever stays within 2.5 m of a machine's middle while it drives 4 m is in its cab, and no hazard."),
+    ] = True
+    together: Annotated[
+        tuple[tuple[int, int], ...],
+        Doc("Pairs of track ids that work together, such as a banksman and a loader: no hazard."),
+    ] = ()
     horizon_s: Annotated[
         float,
         Interval(ge=1, le=5),

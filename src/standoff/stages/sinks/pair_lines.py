@@ -24,7 +24,7 @@ class PairLine:
         row_a: Row of one end among the tracks.
         row_b: Row of the other.
         tone: Severity of the pair's hazard, "unknown" when unmeasured, "light" otherwise.
-        text: The distance with its standard error, or "unknown".
+        text: The distance with its standard error, or "unknown"; and why it is no hazard, if it is none however near.
         dashed: True where the distance is not of this frame: unmeasured, or an end coasts.
     """
 
@@ -96,10 +96,11 @@ def _line(scene: Scene, k: int, key: tuple[int, int], rows: IntArray) -> PairLin
     hazard = scene.hazards.get(key)
     measured = bool(np.isfinite(pairs.distance_m[k]))
     tone: Tone = hazard.severity if hazard else ("light" if measured else "unknown")
+    distance = distance_text(pairs.distance_m[k], pairs.sigma_m[k], filtered=bool(pairs.filtered[k]))
     return PairLine(
         row_a=int(rows[0]),
         row_b=int(rows[1]),
         tone=tone,
-        text=distance_text(pairs.distance_m[k], pairs.sigma_m[k], filtered=bool(pairs.filtered[k])),
+        text=f"{distance}: {pairs.excuse[k]}" if pairs.excuse[k] else distance,
         dashed=not (measured and scene.tracks.observed[rows].all()),
     )

@@ -74,6 +74,7 @@ _PROXIMITY_COLUMNS = (
     ("closest_in_s", pa.float64(), "s", "until then; null where not measured"),
     ("breach_now", pa.float64(), "", "probability that the gap is negative; null where not measured"),
     ("breach_ahead", pa.float64(), "", "probability that it is, or will be within the horizon; null: not measured"),
+    ("excuse", pa.string(), "", "why it is no hazard however near; empty where it may be one"),
 )
 _FRAMES_COLUMNS = (
     *_FRAME_COLUMNS,
