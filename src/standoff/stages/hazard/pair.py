@@ -28,6 +28,7 @@ class PairWatch:
         self._missing_since_s: float | None = None
         self._lost_since_s: float | None = None
         self._reading = UNMEASURED
+        self._was_clear = False
         self._hazard: OpenHazard | None = None
 
     @property
@@ -39,13 +40,21 @@ class PairWatch:
         """Tell whether a reading says how near the pair is; NaN never does."""
         return not math.isnan(self._cautious_gap_m(reading))
 
-    def measure(self, time_s: float, reading: Reading) -> Hazard | None:
-        """Take a measurement and return what there is to say of it."""
+    def measure(self, time_s: float, reading: Reading, *, rare: bool = False) -> Hazard | None:
+        """Take a measurement and return what there is to say of it.
+
+        Args:
+            time_s: Presentation timestamp.
+            reading: The measurement.
+            rare: The last look was so long ago that what holds is said at once.
+        """
         self._missing_since_s = self._lost_since_s = None
         self._reading = reading
         gap_m = self._cautious_gap_m(reading)
         for latch, limit_m in ((self._near, self._params.buffer_m), (self._breached, 0.0)):
-            latch.update(time_s, enters=gap_m < limit_m, leaves=gap_m > limit_m + self._params.hysteresis_m)
+            leaves = gap_m > limit_m + self._params.hysteresis_m
+            latch.update(time_s, enters=gap_m < limit_m, leaves=leaves, rare=rare)
+        self._was_clear |= not self._near.stirred
         if not self._near.on:
             return self.end(time_s, f"clear for {self._params.release_s:g} s")
         severity = self._severity(gap_m)
@@ -94,6 +103,14 @@ class PairWatch:
         if time_s - self._lost_since_s < self._params.unknown_timeout_s:
             return None
         return self.end(time_s, f"{reason} for {self._params.unknown_timeout_s:g} s")
+
+    def finish(self, time_s: float) -> Hazard | None:
+        """Take that nothing more will come: a pair that was near in all its few looks is said now; `end` follows."""
+        if self._hazard is not None or not self.measurable(self._reading) or self._was_clear:
+            return None
+        self._near.finish()
+        self._breached.finish()
+        return self._open(time_s, self._severity(self._cautious_gap_m(self._reading)))
 
     def end(self, time_s: float, reason: str) -> Hazard | None:
         """Close the hazard, if one is open."""
