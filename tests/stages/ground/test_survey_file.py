@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -94,6 +95,14 @@ def test_a_survey_in_degrees_gives_metres(tmp_path: Path) -> None:
     places_m, _ = updated(ground).to_ground(np.array([[100.0, 400.0], [500.0, 400.0], [100.0, 100.0]]))
     east_m, north_m = places_m[1] - places_m[0], places_m[2] - places_m[0]
     np.testing.assert_allclose([east_m, north_m], [[28.61, 0.0], [0.0, 33.37]], atol=0.01)
+
+
+def test_latitude_before_longitude_is_refused(tmp_path: Path) -> None:
+    swapped = re.sub(
+        r"lonlat: \[([^,]+), ([^\]]+)\]", r"lonlat: [\2, \1]", geographic_survey("lonlat", (8.5, 50.1), 1e-4)
+    )
+    with pytest.raises(GroundError, match="Write the longitude first"):
+        load_survey(survey_file(tmp_path, swapped))
 
 
 @pytest.mark.parametrize(

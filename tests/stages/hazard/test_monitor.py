@@ -366,3 +366,27 @@ def test_a_slower_clock_with_slower_settings_tells_the_same_story(
     )
     told_plain = [(p, s, t * factor) for p, s, t in told(events_of(frames, plain))]
     assert told(events_of(frames, slow, step_s=STEP_S * factor)) == told_plain
+
+
+def test_where_looks_are_rare_a_breach_is_said_at_the_look_that_shows_it() -> None:
+    """One look every two seconds: a second one would come too late."""
+    events = events_of([{(1, 2): 9.0}, {(1, 2): -1.8}, {(1, 2): 9.0}, {(1, 2): 9.0}], step_s=2.0)
+    assert next((e.phase, e.severity, e.time_s) for e in events) == ("opened", "danger", 2.0)
+
+
+@pytest.mark.parametrize("looks", [1, 2])
+def test_what_a_film_shows_in_all_its_few_looks_is_said_at_its_end(looks: int) -> None:
+    monitor = HazardMonitor(CALM)
+    for k in range(looks):
+        assert monitor.update(STEP_S * k, *frame({(1, 2): -2.0}), GROUND, FOLLOWED) == ()
+    assert [(e.phase, e.severity) for e in monitor.close(STEP_S * looks)] == [
+        ("opened", "danger"),
+        ("closed", "danger"),
+    ]
+
+
+def test_noise_in_the_last_frame_is_not_said_at_the_end() -> None:
+    monitor = HazardMonitor(CALM)
+    for k in range(10):
+        monitor.update(STEP_S * k, *frame({(1, 2): 9.0 if k < 9 else -2.0}), GROUND, FOLLOWED)
+    assert monitor.close(STEP_S * 10) == ()

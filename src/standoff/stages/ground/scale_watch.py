@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -21,8 +21,12 @@ _MOST_SIZES = 120
 """Of people, and of machines: what was seen last counts."""
 
 _FEWEST_ENTITIES, _FEWEST_TO_WARN, _FEWEST_TO_REFUSE = 2, 3, 8
-_ABSURD_FACTOR = 10.0
-"""Beyond it no clutter is: as many as are enough to warn are enough to refuse."""
+_ABSURD_FACTOR = 8.0
+"""Beyond it no clutter is, and a point in the wrong place of a number is: as many as are enough to warn are enough to
+refuse, as they are where both people and machines say so."""
+
+_FITS = 2.5
+"""Standard errors by which people and machines may differ and still speak for the same factor."""
 
 _AGREED_SHARE = 0.75
 """So many of the sizes must be off by a factor, in one direction: some clutter passes for people, never so much."""
@@ -40,21 +44,28 @@ class _Sizes:
 
     def log_likely(self) -> tuple[float, float]:
         """Return the factor of which most are nearest, as a logarithm, and the inverse of its variance."""
-        return float(np.median(self.logs)), float(np.median(self.sigmas)) ** -2
+        return float(np.median(self.logs)), self.sigma**-2
+
+    @property
+    def sigma(self) -> float:
+        """Standard error of what most are nearest to, with what all of a crew or a class share."""
+        return float(np.median(self.sigmas))
 
     def log_factor(self) -> float:
         """Return the factor that most agree on, as a logarithm; 0 where they do not agree on a direction."""
         high, low = np.quantile(self.logs, [_AGREED_SHARE, 1.0 - _AGREED_SHARE])
         nearest = float(low if low > 0 else high if high < 0 else 0.0)
         # What all of a class or a crew share does not average out: at least two standard errors must remain.
-        return nearest if abs(float(np.median(self.logs))) > 2.0 * float(np.median(self.sigmas)) else 0.0
+        return nearest if abs(float(np.median(self.logs))) > 2.0 * self.sigma else 0.0
 
 
 class ScaleWatch:
     """A ground stage around another one, which is told when its metres cannot be.
 
     Sizes off by a factor of 1.6 are a warning; by a factor of 4 there is no map. Both need sizes of several people or
-    machines that agree; where people and machines are both seen, both have to be off.
+    machines that agree. Where people and machines are both seen, the surer of the two tells the factor, unless the
+    other contradicts it: a kind of machine may be much smaller than is usual, people hardly. To take the map away both
+    have to be off.
 
     Args:
         inner: What finds the map.
@@ -68,6 +79,7 @@ class ScaleWatch:
         self._sampled_s = -np.inf
         self._refusal = ""
         self._warning, self._worst_log = "", 0.0
+        self._impossible = ""
 
     @property
     def description(self) -> dict[str, Any]:
@@ -103,9 +115,10 @@ class ScaleWatch:
     def _take(self, ground: GroundMap, detections: Detections) -> None:
         sure = detections[detections.score >= _LEAST_SCORE]
         try:
-            log_ratio, sigma = size_ratios(ground, sure.xyxy_px, sure.class_id, self._camera)
-        except GroundError:
-            # A map that is no camera's has no sizes of upright things; its own stage says so.
+            log_ratio, sigma = size_ratios(_right_handed(ground), sure.xyxy_px, sure.class_id, self._camera)
+        except GroundError as error:
+            # The inner stage's points may fit it all the same.
+            self._impossible = f"no camera above level ground sees the ground map so: {error.found}"
             return
         for name, role in _GROUPS.items():
             mine = np.isin(sure.class_id, class_ids(role)) & np.isfinite(log_ratio)
@@ -115,34 +128,49 @@ class ScaleWatch:
             sizes.at_once = max(sizes.at_once, int(mine.sum()))
 
     def _judge(self) -> None:
-        log_factor, seen, at_once = self._agreed()
+        log_factor, seen, at_once, of_both = self._agreed()
+        of_all = of_both or sum(bool(sizes.logs) for sizes in self._sizes.values()) == 1
         enough = at_once >= _FEWEST_ENTITIES
         if enough and seen >= _FEWEST_TO_WARN and abs(log_factor) >= max(np.log(WARNING_FACTOR), self._worst_log):
             self._worst_log, self._warning = abs(log_factor), self._clause()
-        fewest = _FEWEST_TO_WARN if abs(log_factor) >= np.log(_ABSURD_FACTOR) else _FEWEST_TO_REFUSE
-        if not (enough and seen >= fewest and abs(log_factor) >= np.log(REFUSAL_FACTOR)):
+        sure = of_both or abs(log_factor) >= np.log(_ABSURD_FACTOR)
+        fewest = _FEWEST_TO_WARN if sure else _FEWEST_TO_REFUSE
+        if not (enough and of_all and seen >= fewest and abs(log_factor) >= np.log(REFUSAL_FACTOR)):
             self._refusal = ""
         elif not self._refusal:
             # The words stay the same as long as the cause does, so that it can be counted.
             self._refusal = self._clause()
 
-    def _agreed(self) -> tuple[float, int, int]:
-        """Return the least factor that all speak for, as a logarithm, how many sizes say so, of how many at once."""
-        groups = [sizes for sizes in self._sizes.values() if sizes.logs]
+    def _agreed(self) -> tuple[float, int, int, bool]:
+        """Return the factor that all speak for, as a logarithm, by how many sizes, how many at once, and if by both."""
+        groups = sorted((sizes for sizes in self._sizes.values() if sizes.logs), key=lambda sizes: sizes.sigma)
         if not groups:
-            return 0.0, 0, 0
-        factors = [sizes.log_factor() for sizes in groups]
-        log_factor = min(factors, key=abs) if min(factors) > 0 or max(factors) < 0 else 0.0
-        return log_factor, sum(len(sizes.logs) for sizes in groups), sum(sizes.at_once for sizes in groups)
+            return 0.0, 0, 0, False
+        surest, *others = groups
+        log_factor = surest.log_factor()
+        of_both = bool(others) and all(other.log_factor() * log_factor > 0 for other in others)
+        for other in others:
+            apart = abs(other.log_likely()[0] - surest.log_likely()[0])
+            if apart > _FITS * float(np.hypot(other.sigma, surest.sigma)):
+                log_factor = min(log_factor, other.log_factor(), key=abs) if of_both else 0.0
+        return log_factor, sum(len(sizes.logs) for sizes in groups), sum(sizes.at_once for sizes in groups), of_both
 
     def _warnings(self) -> list[str]:
-        return [f"seen through the ground map, {self._warning}"] if self._warning else []
+        sizes = f"seen through the ground map, {self._warning}" if self._warning else ""
+        return [text for text in (sizes, self._impossible) if text]
 
     def _clause(self) -> str:
         """Say how large people and machines look, and which unit was probably meant."""
         groups = {name: sizes.log_likely() for name, sizes in self._sizes.items() if sizes.logs}
         weights = sum(weight for _, weight in groups.values())
         return _clause(sum(log * weight for log, weight in groups.values()) / weights, " and ".join(groups))
+
+
+def _right_handed(ground: GroundMap) -> GroundMap:
+    """Return the map with y to the left of x: metres that are mirrored are as long."""
+    if np.linalg.det(ground.image_to_ground) <= 0:
+        return ground
+    return replace(ground, image_to_ground=np.diag([1.0, -1.0, 1.0]) @ ground.image_to_ground)
 
 
 def _clause(log_factor: float, names: str) -> str:

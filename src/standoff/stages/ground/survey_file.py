@@ -62,7 +62,7 @@ def load_survey(path: Path | str, *, camera: Camera | None = None) -> SurveyedGr
         area_px = numbers(content["area_px"], (-1, 2), f"area_px in {path}")
     time_s = content.get("time_s")
     sigma_px = numbers(content.get("point_sigma_px", 1.0), (), f"point_sigma_px in {path}")
-    return SurveyedGround(
+    ground = SurveyedGround(
         [numbers(point.get("px"), (2,), f"px of {name!r} in {path}") for name, point in points.items()],
         _points_m(points, path),
         (int(width_px), int(height_px)),
@@ -72,6 +72,12 @@ def load_survey(path: Path | str, *, camera: Camera | None = None) -> SurveyedGr
         point_sigma_px=float(sigma_px),
         time_s=None if time_s is None else float(numbers(time_s, (), f"time_s in {path}")),
     )
+    if ground.is_mirrored and any("lonlat" in point for point in points.values()):
+        raise GroundError(
+            expected="lonlat: [longitude, latitude]", found=f"places that mirror the picture in {path}",
+            fix="write the longitude first",
+        )  # fmt: skip
+    return ground
 
 
 def _points_m(points: Mapping[str, Mapping[str, Any]], path: Path) -> FloatArray:

@@ -93,6 +93,11 @@ class SurveyedGround:
         self.description = _describe(self.fit, self._surveyed, names, point_sigma_px)
 
     @property
+    def is_mirrored(self) -> bool:
+        """Whether y of the metres lies to the right of x, seen from above."""
+        return bool(np.linalg.det(self._surveyed.image_to_ground) > 0)
+
+    @property
     def has_area(self) -> bool:
         """Whether there is a limit to where the map is trusted."""
         return len(self._surveyed.valid_px) > 0

@@ -52,15 +52,27 @@ class Latch:
         """Whether it is on, or on its way to turn on."""
         return self.on or self._since_s is not None
 
-    def update(self, time_s: float, *, enters: bool, leaves: bool) -> None:
-        """Take what holds now; neither holds between the two limits of a hysteresis."""
+    def update(self, time_s: float, *, enters: bool, leaves: bool, rare: bool = False) -> None:
+        """Take what holds now; neither holds between the two limits of a hysteresis.
+
+        Args:
+            time_s: Presentation timestamp.
+            enters: It should turn on.
+            leaves: It should turn off.
+            rare: The last look was so long ago that a second one would come too late: it turns on at once.
+        """
         if not (leaves if self.on else enters):
             self._since_s = None
             return
         if self._since_s is None:
             self._since_s = time_s
-        if time_s - self._since_s >= (self._off_after_s if self.on else self._on_after_s):
+        if (rare and not self.on) or time_s - self._since_s >= (self._off_after_s if self.on else self._on_after_s):
             self.on, self._since_s = not self.on, None
+
+    def finish(self) -> None:
+        """Turn on if it was about to: nothing more will come."""
+        if self.stirred:
+            self.hold_on()
 
     def miss(self) -> None:
         """Take that nothing was measured: no step towards off, and no step back from on."""

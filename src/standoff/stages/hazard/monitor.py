@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 
 from standoff.core.homography import BoolArray
@@ -53,7 +54,8 @@ class HazardMonitor:
     """Raise, follow and close the hazards of one stream.
 
     A hazard's first event is "opened", its last "closed", and nothing follows that. An event carries the
-    time at which it is said, `min_duration_s` after the condition began. What cannot be measured is
+    time at which it is said, `min_duration_s` after the condition began; at once where frames are further apart than
+    that, and at the end of the stream for what only its last frames showed. What cannot be measured is
     never taken for safe: an open hazard becomes "unknown", a visible pair that stays unmeasured opens
     one of severity "unknown", and a stream without a ground map has one hazard of rule "measurement"
     in place of one for each pair; where many sure detections are in no track, there is another one.
@@ -67,6 +69,7 @@ class HazardMonitor:
         self._map = MapWatch(self._params)
         self._follow = FollowWatch(self._params)
         self._pairs: dict[Pair, PairWatch] = {}
+        self._looked_s = math.inf
 
     @property
     def description(self) -> dict[str, list[str]]:
@@ -91,6 +94,8 @@ class HazardMonitor:
             unfollowed: (K,) which of the frame's sure detections are in no track.
         """
         events = [self._map.update(time_s, ground), self._follow.update(time_s, unfollowed)]
+        rare = time_s - self._looked_s > self._params.min_duration_s
+        self._looked_s = time_s
         readings = _readings(proximities)
         reasons = dict(zip(positions.track_id.tolist(), positions.reason.tolist(), strict=True))
         for pair in sorted(self._pairs.keys() | readings.keys()):
@@ -100,7 +105,7 @@ class HazardMonitor:
                 followed = reasons.keys() >= set(pair)
                 events.append(watch.lose(time_s, NOT_WATCHED if followed else TRACK_LOST))
             elif watch.measurable(reading):
-                events.append(watch.measure(time_s, reading))
+                events.append(watch.measure(time_s, reading, rare=rare))
             else:
                 reason = reasons.get(pair[0]) or reasons.get(pair[1]) or NOT_MEASURED
                 events.append(watch.miss(time_s, reason, may_open=bool(ground)))
@@ -110,7 +115,8 @@ class HazardMonitor:
     def close(self, time_s: float) -> tuple[Hazard, ...]:
         """End the stream: close everything that is open."""
         events = [self._map.end(time_s, STREAM_ENDED), self._follow.end(time_s, STREAM_ENDED)]
-        events += [self._pairs[pair].end(time_s, STREAM_ENDED) for pair in sorted(self._pairs)]
+        for pair in sorted(self._pairs):
+            events += [self._pairs[pair].finish(time_s), self._pairs[pair].end(time_s, STREAM_ENDED)]
         self._map, self._pairs = MapWatch(self._params), {}
         return _said(events)
 
@@ -119,6 +125,7 @@ class HazardMonitor:
         self._map = MapWatch(self._params)
         self._follow = FollowWatch(self._params)
         self._pairs = {}
+        self._looked_s = math.inf
 
 
 def _readings(proximities: Proximities) -> dict[Pair, Reading]:

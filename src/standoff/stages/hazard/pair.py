@@ -27,6 +27,7 @@ class PairWatch:
         self._missing_since_s: float | None = None
         self._lost_since_s: float | None = None
         self._reading = UNMEASURED
+        self._was_clear = False
         self._hazard: OpenHazard | None = None
 
     @property
@@ -34,19 +35,30 @@ class PairWatch:
         """Whether a hazard is open."""
         return self._hazard is not None
 
+    @property
+    def _is_stirred(self) -> bool:
+        return self._near.stirred or self._breached.stirred
+
     def measurable(self, reading: Reading) -> bool:
         """Tell whether a reading says how near the pair is; NaN never does."""
         return levels_of(reading, self._params) is not None
 
-    def measure(self, time_s: float, reading: Reading) -> Hazard | None:
-        """Take a measurement and return what there is to say of it."""
+    def measure(self, time_s: float, reading: Reading, *, rare: bool = False) -> Hazard | None:
+        """Take a measurement and return what there is to say of it.
+
+        Args:
+            time_s: Presentation timestamp.
+            reading: The measurement.
+            rare: The last look was so long ago that what holds is said at once.
+        """
         self._missing_since_s = self._lost_since_s = None
         self._reading = reading
         levels = levels_of(reading, self._params)
         if levels is None:
             raise ValueError("a reading that tells nothing is a miss")
-        self._near.update(time_s, enters=levels.near.enters, leaves=levels.near.leaves)
-        self._breached.update(time_s, enters=levels.breached.enters, leaves=levels.breached.leaves)
+        self._near.update(time_s, **levels.near._asdict(), rare=rare)
+        self._breached.update(time_s, **levels.breached._asdict(), rare=rare)
+        self._was_clear |= not self._is_stirred
         if not self._near.on and not self._breached.on:
             return self.end(time_s, reading.excuse or f"clear for {self._params.release_s:g} s")
         severity = self._severity(clear=levels.near.leaves)
@@ -99,6 +111,14 @@ class PairWatch:
         if time_s - self._lost_since_s < self._params.unknown_timeout_s:
             return None
         return self.end(time_s, f"{reason} for {self._params.unknown_timeout_s:g} s")
+
+    def finish(self, time_s: float) -> Hazard | None:
+        """Take that nothing more will come: a pair that was near in all its few looks is said now; `end` follows."""
+        if self._hazard is not None or not self.measurable(self._reading) or self._was_clear:
+            return None
+        self._near.finish()
+        self._breached.finish()
+        return self._open(time_s, self._severity(clear=False))
 
     def end(self, time_s: float, reason: str) -> Hazard | None:
         """Close the hazard, if one is open."""
