@@ -238,3 +238,14 @@ def test_frames_taken_each_by_itself_need_no_motion() -> None:
         length, sigma = distance_and_sigma(_seen(result), PAIR_PX)
         assert abs(length - _true_m(_flown(k).view)) < 3.0 * sigma
         assert _seen(result).site_frame == 0, "places of one reference can be compared from frame to frame"
+
+
+@pytest.mark.parametrize(("wider", "believed"), [(1.0, True), (1.15, True), (1.6, False)])
+def test_what_fills_only_a_part_of_the_detectors_box_is_something_else(wider: float, believed: bool) -> None:
+    """A frame in front of a reference that is mostly hidden may have its shape."""
+    box = box_around(SHAPE, _flown(0))
+    middle, half = (box[:2] + box[2:]) / 2.0, wider * (box[2:] - box[:2]) / 2.0
+    loose = np.concatenate([middle - half, middle + half])[None]
+    detected = Detections(loose, np.array([0.9]), np.array([CLASS_BY_NAME["reference"].id]))
+    result = _ground(place=GivenPlace()).update(frame(_picture(0)), detected, STILL)
+    assert isinstance(result, GroundMap) == believed

@@ -21,7 +21,11 @@ from standoff.stages.ground.solid_observer import Reference, SolidObserver
 from standoff.stages.ground.turned import doubt_between
 from standoff.stages.ground.which_box import sort_out
 
+CONTRADICTED = "the reference looks otherwise than the drone's telemetry says"
 OTHERWISE = "a reference does not look as it must from where the camera is"
+
+_DOUBTED_S = 2.0
+"""For so long a reference that telemetry contradicts is not believed: what hides a part of it soon hides another."""
 
 _MOST_LENS_DOUBTS = 2
 """Each costs a search."""
@@ -46,13 +50,15 @@ class ReferenceLandmarks:
         self._solids = [
             SolidObserver(one, _name(k, len(references)), remember=remember) for k, one in enumerate(references)
         ]
-        self._telemetry = telemetry
+        self._telemetry, self._remember = telemetry, remember
         self._lens_doubts = 0
+        self._contradicted_s: float | None = None
         self._why_unseen: dict[str, str] = {}
 
     def reset(self) -> None:
         """Forget everything that the pictures have told."""
         self._lens_doubts = 0
+        self._contradicted_s = None
         self._why_unseen.clear()
         for solid in self._solids:
             solid.reset()
@@ -128,14 +134,12 @@ class ReferenceLandmarks:
         doubt = doubt_between(own, found.alternatives, solid.reference.shape)
         outranks = solid.reference.place_known and belief.frame_of not in ("", STATED)
         if not held or outranks:
-            self._begin(solid, own, doubt, moment, belief)
-            return ""
+            return self._begin(solid, own, doubt, moment, belief)
         reason = _join(solid, own, moment, belief)
         alone = len(self._solids) == 1 and belief.source == "reference"
         if reason and alone and solid.is_elsewhere(time_s, moment.detections):
             # What was believed began with a mistake.
-            self._begin(solid, own, doubt, moment, belief)
-            return ""
+            return self._begin(solid, own, doubt, moment, belief)
         return reason
 
     def _doubt_lens(self, moment: Moment, belief: CameraBelief, solid: SolidObserver) -> None:
@@ -148,9 +152,8 @@ class ReferenceLandmarks:
         if text:
             belief.warnings.setdefault("lens", f"{text} ({moment.text})")
 
-    def _begin(
-        self, solid: SolidObserver, own: Belief, doubt: FloatArray, moment: Moment, belief: CameraBelief
-    ) -> None:
+    def _begin(self, solid: SolidObserver, own: Belief, doubt: FloatArray, moment: Moment, belief: CameraBelief) -> str:
+        """Begin the belief with what one reference shows; return why not, or ""."""
         own, text = refitted_lens(moment.luma, solid.reference.shape, own, belief.lens)
         if text:
             belief.warnings.setdefault("lens", f"{text} ({moment.text})")
@@ -158,6 +161,8 @@ class ReferenceLandmarks:
         telemetry = moment.frame.telemetry
         if self._telemetry and telemetry is not None:
             own, contradiction = with_telemetry(own, telemetry)
+            if contradiction and self._still_doubts(moment.frame.time_s):
+                return CONTRADICTED
             if contradiction:
                 text = f"{contradiction} ({moment.text}): {solid.name} is trusted, because its size was measured"
                 belief.warnings.setdefault("telemetry", text)
@@ -168,6 +173,15 @@ class ReferenceLandmarks:
         belief.begin("reference", own, moment, frame_of=frame_of, keeper=solid.name, height_known=known, doubt=doubt)
         solid.defines_frame()
         moment.anchors_px.append(solid.note(own.state))
+        return ""
+
+    def _still_doubts(self, time_s: float) -> bool:
+        """Return whether a contradiction is new; where frames know of none before them it never is."""
+        if not self._remember:
+            return False
+        if self._contradicted_s is None:
+            self._contradicted_s = time_s
+        return time_s - self._contradicted_s < _DOUBTED_S
 
 
 def _name(index: int, count: int) -> str:

@@ -38,7 +38,14 @@ another thing carries the map anyway."""
 _MAX_REFUSED_S = 1.0
 """When a reference that can be seen has contradicted what is predicted for so long, it is searched for again."""
 
+_LEAST_FILLED = 0.65
+"""Of a detector's box, what is found in it covers so much, or it is something else in the box."""
+
+_MOST_ELSEWHERE = 0.5
+"""Of a detector's box, so much at most may lie beside where the reference is believed to be: its sides do."""
+
 NOT_DUE = "the reference is searched for a few times a second only"
+NOT_FILLED = "what has the reference's shape fills only a part of its box"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -222,6 +229,8 @@ class SolidObserver:
         found = search_solid(gray, box, self.reference.shape, camera, self.height, agrees)
         if isinstance(found, Found) and self.reference.height_m is None:
             found = with_foot(found, gray, picture.bgr(), self.reference.shape)
+        if isinstance(found, Found) and not self._fills(found.fit.state, box):
+            found = NoGroundMap(NOT_FILLED)
         self._searched = (time_s, NoGroundMap(NOT_DUE) if isinstance(found, Found) else found)
         return found
 
@@ -231,7 +240,18 @@ class SolidObserver:
         if self._box is None or isinstance(box, NoGroundMap):
             return False
         middle = (self._box[:2] + self._box[2:]) / 2.0
-        return not bool(((middle >= box[:2]) & (middle <= box[2:])).all())
+        beside = 1.0 - _covered(box, self._box) > _MOST_ELSEWHERE
+        return beside or not bool(((middle >= box[:2]) & (middle <= box[2:])).all())
+
+    def _fills(self, own: SolidState, box: FloatArray) -> bool:
+        """Return whether a solid covers a detector's box; an operator's may be drawn wide."""
+        if self.reference.place.box_xyxy_px is not None:
+            return True
+        shape = self.reference.shape
+        corners_m = np.concatenate([shape.at_height(own.height_m), shape.at_height(0.0)])
+        corners_px = project(own.view, corners_m)
+        around = np.concatenate([corners_px.min(axis=0), corners_px.max(axis=0)])
+        return _covered(box, around) >= _LEAST_FILLED
 
     def belief(self, found: Found) -> Belief:
         """Return what was found, as a belief in its own frame, with the corners named as before."""
@@ -315,3 +335,9 @@ class SolidObserver:
         near = None if self._box is None else detected_box(detections, least, near_box_px=self._box, taken=taken)
         detected = near if near is not None else detected_box(detections, least, taken=taken)
         return NoGroundMap(NOT_SEEN) if detected is None else detected
+
+
+def _covered(box: FloatArray, by: FloatArray) -> float:
+    """Return the share of a box (4,) that another covers."""
+    sides = np.minimum(box[2:], by[2:]) - np.maximum(box[:2], by[:2])
+    return float(np.prod(np.maximum(sides, 0.0)) / np.prod(np.maximum(box[2:] - box[:2], 1e-9)))
