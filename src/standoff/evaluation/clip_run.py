@@ -16,12 +16,13 @@ from standoff.config import Settings
 from standoff.core.classes import CLASSES
 from standoff.core.errors import DataError
 from standoff.core.types import FrameResult, Severity
+from standoff.evaluation.matching import NOTHING
 from standoff.evaluation.paper.clip import Clip
 from standoff.evaluation.paper.localisation import ClassScore, score_localisation
 from standoff.evaluation.paper.map_only import MapScore, score_map
 from standoff.evaluation.paper.pairs import PairGroup, group_pairs, pair_series
 from standoff.evaluation.paper.trial import Trial, build_monitor, settings_for
-from standoff.evaluation.paper.watch import NOTHING, Notes, open_clip_video
+from standoff.evaluation.paper.watch import Notes, open_clip_video
 
 Pair = tuple[int, int]
 Kind = Literal["near miss", "breach"]

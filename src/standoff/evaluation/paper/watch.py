@@ -9,11 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from standoff.core.boxes import overlaps
-from standoff.core.classes import CLASSES
 from standoff.core.errors import DataError
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import FrameResult, GroundMap, IntArray, NoGroundMap, TextArray
+from standoff.evaluation.matching import NOTHING, match_boxes
 from standoff.evaluation.paper.clip import Clip, inside
 from standoff.evaluation.paper.mapped_points import MappedPoints, level_feet_px
 from standoff.evaluation.paper.snapshots import Snapshots
@@ -23,21 +22,13 @@ from standoff.evaluation.paper.turning import Turning
 from standoff.evaluation.rectification import FAILURE_PX
 from standoff.stages.frames import Source, open_source
 from standoff.stages.ground import ReferenceShape
-from standoff.stages.track.association import assign
 
 NOT_VISIBLE = "not visible"
 NOT_DETECTED = "not detected"
 NOT_BY_REFERENCE = "measured by the drone's telemetry alone"
 WRONG = f"a corner is more than {FAILURE_PX:g} px off"
-MIN_OVERLAP = 0.3
-"""Smallest IoU of a box with the truth's for the two to be the same thing."""
-
 _ELSEWHERE = "telemetry"
 """The method of maps whose site frame is not the reference's."""
-
-_ROLE = np.array([site_class.role.value for site_class in CLASSES])
-NOTHING = -1
-"""In place of a row where there is none."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -190,8 +181,9 @@ class Notes:
         if self._true_ids:
             track_row = detection_row = self._rows_by_id(tracks.track_id)
         else:
-            track_row = self._rows_by_overlap(frame, tracks.xyxy_px, tracks.class_id)
-            detection_row = self._rows_by_overlap(frame, detections.xyxy_px, detections.class_id)
+            true_px, true_class = self._clip.box_px[frame], self._clip.class_id
+            track_row = match_boxes(true_px, true_class, tracks.xyxy_px, tracks.class_id)
+            detection_row = match_boxes(true_px, true_class, detections.xyxy_px, detections.class_id)
         detected, tracked = detection_row != NOTHING, track_row != NOTHING
         watched.detected_px[frame, detected] = detections.xyxy_px[detection_row[detected]]
         if watched.no_map[frame] == NOT_BY_REFERENCE:
@@ -248,16 +240,6 @@ class Notes:
         """Return (E,) the row of each entity under its own id, or -1."""
         row_of = np.full(len(self._clip.entity_id), NOTHING)
         row_of[np.searchsorted(self._clip.entity_id, track_id)] = np.arange(len(track_id))
-        return row_of
-
-    def _rows_by_overlap(self, frame: int, boxes_px: FloatArray, class_id: IntArray) -> IntArray:
-        """Return (E,) the row of the box that covers each visible entity, or -1."""
-        row_of = np.full(len(self._clip.entity_id), NOTHING)
-        visible = np.flatnonzero(np.isfinite(self._clip.box_px[frame]).all(axis=1))
-        similarity = overlaps(self._clip.box_px[frame, visible], boxes_px)
-        similarity *= _ROLE[self._clip.class_id[visible]][:, None] == _ROLE[class_id]
-        first, second = assign(similarity, MIN_OVERLAP)
-        row_of[visible[first]] = second
         return row_of
 
 
