@@ -64,7 +64,8 @@ def plane_sigmas(off: FloatArray, covariance: FloatArray) -> FloatArray:
     array([1.])
     """
     inverse = np.linalg.pinv(covariance, hermitian=True)
-    return np.sqrt(np.einsum("ni,nij,nj->n", off, inverse, off))
+    distances: FloatArray = np.sqrt(np.einsum("ni,nij,nj->n", off, inverse, off))
+    return distances
 
 
 @dataclass(frozen=True, slots=True)
