@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 from evaluation.coverage.drawn_run import CLASSES, FRAMES, SIZE_PX, SQUARE_M, TRACK_OF, Drawn, draw
 
@@ -255,6 +256,23 @@ def test_a_pair_shows_as_the_worse_of_the_two(
     assert row_of(result, "worker-wheel_loader", "whole").score.frames == FRAMES * PEOPLE
 
 
+def test_a_run_that_found_nobody_measured_nothing(drawn: Drawn, tmp_path: Path) -> None:
+    run, clip = drawn.write(tmp_path)
+    for name in ("tracks", "proximity"):
+        table = pq.read_table(run / f"{name}.parquet")
+        pq.write_table(table.slice(0, 0), run / f"{name}.parquet")
+    result = evaluate_coverage([(run, clip)])
+    score = row_of(result).score
+    assert (score.measured, score.frames) == (0, FRAMES * PEOPLE * MACHINES)
+    assert math.isnan(score.made_m) and {row.located for row in result.positions} == {0}
+
+
+def test_a_clip_without_a_pair_has_nothing_to_score(drawn: Drawn, tmp_path: Path) -> None:
+    drawn.truth = [row for row in drawn.truth if row["class_id"] != 0]
+    with pytest.raises(DataError, match="a worker and a machine"):
+        evaluate_coverage([drawn.write(tmp_path)])
+
+
 def test_only_frames_that_the_run_read_count(drawn: Drawn, tmp_path: Path) -> None:
     drawn.frames = drawn.frames[::2]
     drawn.tracks = [row for row in drawn.tracks if row["frame"] % 2 == 0]
@@ -279,10 +297,12 @@ def test_places_counted_from_elsewhere_are_not_compared(drawn: Drawn, tmp_path: 
         row["map_method"] = "telemetry"
     result = evaluate_coverage([drawn.write(tmp_path / "some")])
     assert {row.located / row.visible for row in result.positions} == {1.0 - 10 / FRAMES}
-    drawn.record = {"source": {}, "settings": {"ground": {"reference": {"square_m": 3.0}}}}
-    result = evaluate_coverage([drawn.write(tmp_path / "all")])
-    assert (result.positions, result.runs_without_positions) == ((), 1)
-    assert row_of(result).score.measured == FRAMES * PEOPLE * MACHINES
+    moved_m = (SQUARE_M + 1.0).tolist()
+    for k, reference in enumerate(({"square_m": 3.0}, {"corners_m": moved_m}, {"corners_m": "all"}, None)):
+        drawn.record = {"source": {}, "settings": {"ground": {"reference": reference}}}
+        result = evaluate_coverage([drawn.write(tmp_path / f"{k}")])
+        assert (result.positions, result.runs_without_positions) == ((), 1)
+        assert row_of(result).score.measured == FRAMES * PEOPLE * MACHINES
 
 
 def _later(drawn: Drawn) -> None:

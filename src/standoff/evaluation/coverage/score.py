@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from standoff.core.errors import DataError
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import IntArray
 from standoff.evaluation.coverage.samples import SIGHTS, ClipSamples
@@ -131,7 +132,16 @@ def score_samples(clips: Sequence[ClipSamples]) -> CoverageResult:
 
     Args:
         clips: One at least.
+
+    Raises:
+        DataError: No clip shows a person and a machine at once.
     """
+    if not any(len(one.pairs.kind) for one in clips):
+        raise DataError(
+            expected="a worker and a machine that can be seen at once",
+            found=f"none in {', '.join(str(one.clip) for one in clips)}",
+            fix="choose another clip",
+        )
     folders = [one.clip.resolve() for one in clips]
     different = sorted(set(folders))
     own = np.array([different.index(folder) for folder in folders])

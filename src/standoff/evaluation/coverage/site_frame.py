@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from standoff.core.homography import FloatArray
 from standoff.evaluation.paper.clip import read_scene
 from standoff.evaluation.paper.turning import Turning
 from standoff.stages.ground import ReferenceShape
@@ -27,14 +28,23 @@ def shared_turning(settings: Mapping[str, Any], clip: Path) -> Turning | None:
     Raises:
         DataError: The clip's scene is missing or broken.
     """
-    told = (settings.get("ground") or {}).get("reference") or {}
-    entry = read_scene(clip)["reference"]
-    if entry is None or not told.get("corners_m"):
+    entry, told_m = read_scene(clip)["reference"], _corners_told(settings)
+    if entry is None or told_m is None:
         return None
-    corners_m, true_m = np.array(told["corners_m"]), np.array(entry["top_m"])[:, :2]
-    if corners_m.shape != true_m.shape or np.abs(corners_m - true_m).max() > _SAME_M:
+    true_m = np.array(entry["top_m"], dtype=np.float64)[:, :2]
+    if told_m.shape != true_m.shape or np.abs(told_m - true_m).max() > _SAME_M:
         return None
     return Turning(ReferenceShape.from_corners(true_m), true_m)
+
+
+def _corners_told(settings: Mapping[str, Any]) -> FloatArray | None:
+    section: Any = settings
+    for name in ("ground", "reference", "corners_m"):
+        section = section.get(name) if isinstance(section, Mapping) else None
+    try:
+        return None if section is None else np.array(section, dtype=np.float64)
+    except (TypeError, ValueError):
+        return None
 
 
 def rests_on_reference(method: str | None) -> bool:

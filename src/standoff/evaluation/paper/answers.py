@@ -163,7 +163,7 @@ def both_radii_m(clip: Clip, settings: Settings) -> FloatArray:
 
 def seen_together(clip: Clip) -> BoolArray:
     """Return (F, P) whether both of each pair can be seen in each frame."""
-    visible: BoolArray = np.isfinite(clip.box_px).all(axis=2)
+    visible = np.asarray(np.isfinite(clip.box_px).all(axis=2))
     return visible[:, clip.pairs[:, 0]] & visible[:, clip.pairs[:, 1]]
 
 
