@@ -74,7 +74,14 @@ class Run:
             self._mark.release()
 
 
-def open_run(source: Path | str, out: Path | str, settings: Settings, *, overwrite: bool = False) -> Run:
+def open_run(
+    source: Path | str,
+    out: Path | str,
+    settings: Settings,
+    *,
+    overwrite: bool = False,
+    checked: Callable[[], str] | None = None,
+) -> Run:
     """Open the source, build the pipeline, then prepare the folder: nothing is written if anything is wrong.
 
     Args:
@@ -82,6 +89,7 @@ def open_run(source: Path | str, out: Path | str, settings: Settings, *, overwri
         out: Output folder; created.
         settings: What to run.
         overwrite: Replace the files of an earlier run in the folder.
+        checked: For the report, after the last frame: how true the stated errors are, where truth is known.
 
     Raises:
         StandoffError: A source, model, survey, camera, setting or folder that cannot be used.
@@ -118,7 +126,7 @@ def open_run(source: Path | str, out: Path | str, settings: Settings, *, overwri
     mark = FolderInUse(folder)
     # The record first, so that a folder without room is told before anything else is begun.
     record = RecordSink(folder / RECORD, descriptions, at_close)
-    own = build_sinks(settings, folder, descriptions, at_close)
+    own = build_sinks(settings, folder, descriptions, at_close, checked)
     # And closed last, so that it times all others.
     pipeline.sinks = {**own, **extra, "record": record}
     return Run(frames, pipeline, folder, record, mark)
@@ -154,6 +162,7 @@ def build_sinks(
     folder: Path,
     descriptions: dict[str, Any],
     at_close: Callable[[], Mapping[str, Any]] | None = None,
+    checked: Callable[[], str] | None = None,
 ) -> dict[str, Sink]:
     """Make the configured outputs of standoff's own, without the record.
 
@@ -162,6 +171,7 @@ def build_sinks(
         folder: Where they go.
         descriptions: For the report.
         at_close: Gives descriptions anew once the last frame has been seen.
+        checked: Gives then what the report says of how true the stated errors are, where truth is known.
     """
     makers: dict[str, Any] = {
         "tracks": lambda: TableSink(folder / "tracks.parquet", TRACKS, settings.tables),
@@ -180,6 +190,7 @@ def build_sinks(
             descriptions,
             warning_gap_m=settings.hazard.buffer_m,
             at_close=at_close,
+            checked=checked,
         ),
     }
     return {name: makers[name]() for name in settings.outputs}

@@ -50,7 +50,9 @@ def test_the_demo_writes_all_outputs_and_prints_how_far_off_it_is(drawn: Clip, t
     assert made >= {"report.html", "annotated.mp4", "run.json", "tracks.parquet", "proximity.parquet", "hazards.jsonl"}
     for words in ("complete", "recall", "MADE", " of 2 recognised", "False warnings", "report.html", "annotated.mp4"):
         assert words in said
-    assert "the paper's method" in said and "frames with a map" in said
+    assert "the paper's method" in said and "frames with a map" in said and "inside 68, 95 %" in said
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert "How true the stated errors are" in page and "not checked on your site" not in page
     found, record = json.loads((tmp_path / "found.json").read_text()), json.loads((out / "run.json").read_text())
     assert found["frames"] == drawn.frame_count
     assert {one["kind"] for one in found["encounters"]} == {"breach"}

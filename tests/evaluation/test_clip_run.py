@@ -128,6 +128,9 @@ def test_the_score_is_plain_json_types(clip: Clip, tmp_path: Path, monkeypatch: 
     figures = score_of(clip, settings, MovedBoxes(clip), tmp_path / "run", monkeypatch).to_dict()
     assert [one["recognised"] for one in figures["encounters"]] == [True, True]
     assert {group["class_pair"] for group in figures["pairs"]} == {"worker-excavator", "worker-wheel_loader"}
+    for group in figures["pairs"]:
+        assert 0.0 <= group["coverage"]["inside_68"] <= group["coverage"]["inside_95"] <= 1.0
+        assert group["coverage"]["sigma_m"] > 0.0
 
 
 @pytest.mark.parametrize(

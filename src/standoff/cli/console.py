@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING
@@ -47,6 +48,34 @@ def print_table(
     console.print(table)
     if caption:
         console.print(caption)
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table for people: the first `texts` columns are words, the others numbers."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: list[tuple[str, ...]]
+    caption: str = ""
+    texts: int = 1
+
+    def markdown(self) -> str:
+        """Return the table as Markdown."""
+        rule = ["---" if place < self.texts else "---:" for place in range(len(self.columns))]
+        lines = [" | ".join(cells) for cells in (self.columns, rule, *self.rows)]
+        return "\n".join([f"**{self.title}**", "", *(f"| {line} |" for line in lines), "", self.caption]).rstrip()
+
+
+def print_tables(tables: Iterable[Table], *, as_markdown: bool) -> None:
+    """Print those tables that have rows."""
+    for table in tables:
+        if not table.rows:
+            continue
+        if as_markdown:
+            typer.echo(table.markdown() + "\n")
+        else:
+            print_table(table.title, table.columns, table.rows, table.caption, texts=table.texts)
 
 
 def progress_bar(*, quiet: bool, unit: str = "frames") -> Progress:

@@ -12,6 +12,7 @@ from standoff.cli.run import detector_overrides, exit_status, tell, watch
 from standoff.core.errors import DataError
 
 if TYPE_CHECKING:
+    from standoff.evaluation.clip_run import ClipWitness
     from standoff.evaluation.paper import Clip
 
 
@@ -41,7 +42,7 @@ def demo(
     clip = _load_film()
     # As a user would: the film's own description of its reference object and camera, and defaults for all else.
     settings = load_settings(clip.folder / "reference.yaml", detector_overrides(model, detections))
-    run = open_run(clip.video, out, settings, overwrite=overwrite)
+    run = open_run(clip.video, out, settings, overwrite=overwrite, checked=lambda: _checked(witness))
     witness = ClipWitness(clip, settings, run.source.size_px)
     watch(run, quiet=quiet, on_result=witness.take)
     tell(run, as_json=False, quiet=quiet)
@@ -57,6 +58,17 @@ def demo(
         print_scores(score, paper)
         typer.echo(f"Open {out / 'report.html'} in a browser, and {out / 'annotated.mp4'} in a player.")
     raise typer.Exit(exit_status(run))
+
+
+def _checked(witness: ClipWitness) -> str:
+    """Return what the report says of the stated errors; nothing where the film was not seen to its end."""
+    from standoff.evaluation.paper.pairs import AFTER
+    from standoff.evaluation.reliability import reliability_section
+
+    if not witness.has_seen_all:
+        return ""
+    kinds = [(group.class_pair, group.scores[AFTER], group.coverage) for group in witness.score_pairs()]
+    return reliability_section(kinds, "this simulated film")
 
 
 def _load_film() -> Clip:

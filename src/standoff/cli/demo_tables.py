@@ -10,6 +10,7 @@ from standoff.cli.console import print_table
 if TYPE_CHECKING:
     from standoff.evaluation.clip_run import ClipScore, Encounter
     from standoff.evaluation.paper.metrics import DistanceScore
+    from standoff.evaluation.paper.pairs import PairGroup
 
 
 def print_scores(ours: ClipScore, papers: ClipScore) -> None:
@@ -27,7 +28,8 @@ def print_scores(ours: ClipScore, papers: ClipScore) -> None:
     ]  # fmt: skip
     caption = (
         "From the same detections. Map: true feet within 20 m of the reference through the map, boxes left out; level: "
-        "if the ground were. MADE: the paper's mean absolute error of distances, from box to metre."
+        "if the ground were. MADE: the paper's mean absolute error of distances, from box to metre. Inside: share of "
+        "the distances whose truth is within 1 and 1.96 stated standard errors."
     )
     print_table("Against the film's truth", ("", "the paper's method", "standoff"), rows, caption)
 
@@ -69,9 +71,14 @@ def _compared(score: ClipScore) -> list[tuple[str, str]]:
         ("map, ground as it is: median, 95 %", f"{_number(uneven.median_m, 'm')}, {_number(uneven.p95_m, 'm')}"),
         ("distances measured", f"{measured} of {frames}"),
         *((f"MADE {name.replace('_', ' ')}", _number(one.made_m, "m")) for name, one in pairs.items()),
+        *((f"inside 68, 95 %, {group.class_pair.replace('_', ' ')}", _inside(group)) for group in score.pairs),
         ("encounters recognised", _recognised(score)),
         ("false warnings and dangers", f"{len(score.false_hazards)}"),
     ]
+
+
+def _inside(group: PairGroup) -> str:
+    return ", ".join(_number(100 * share, "%", 0) for share in (group.coverage.inside_68, group.coverage.inside_95))
 
 
 def _after(score: ClipScore, class_pair: str) -> DistanceScore:

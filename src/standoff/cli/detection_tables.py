@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-import typer
-
-from standoff.cli.console import print_table
+from standoff.cli.console import Table, print_tables
 from standoff.core.classes import CLASSES, Role
 from standoff.evaluation.detection.coco import HEIGHT_BANDS_PX
 from standoff.evaluation.detection.score import PRECISION
@@ -23,33 +20,10 @@ _NONE = "n/a"
 _WORKER = next(site_class.name for site_class in CLASSES if site_class.role is Role.PERSON)
 
 
-@dataclass(frozen=True, slots=True)
-class _Table:
-    """The first `texts` columns are words, the others numbers."""
-
-    title: str
-    columns: tuple[str, ...]
-    rows: list[tuple[str, ...]]
-    caption: str = ""
-    texts: int = 1
-
-    def markdown(self) -> str:
-        """Return the table as Markdown."""
-        rule = ["---" if place < self.texts else "---:" for place in range(len(self.columns))]
-        lines = [" | ".join(cells) for cells in (self.columns, rule, *self.rows)]
-        return "\n".join([f"**{self.title}**", "", *(f"| {line} |" for line in lines), "", self.caption]).rstrip()
-
-
 def print_comparison(comparison: Comparison, *, as_markdown: bool = False) -> None:
     """Print the models side by side, then class by class."""
     tables = [make(comparison) for make in (_summary, _by_class, _at_best, _by_height, _points, _at_thresholds)]
-    for table in tables:
-        if not table.rows:
-            continue
-        if as_markdown:
-            typer.echo(table.markdown() + "\n")
-        else:
-            print_table(table.title, table.columns, table.rows, table.caption, texts=table.texts)
+    print_tables(tables, as_markdown=as_markdown)
 
 
 def _number(value: float, digits: int = 3) -> str:
@@ -60,7 +34,7 @@ def _count(number: int, noun: str) -> str:
     return f"{number} {noun}" + ("" if number == 1 else "s")
 
 
-def _summary(comparison: Comparison) -> _Table:
+def _summary(comparison: Comparison) -> Table:
     results = comparison.results
     rows = [(label, *(_number(figure(result)) for result in results)) for label, figure in _FIGURES.items()]
     if comparison.chance:
@@ -73,7 +47,7 @@ def _summary(comparison: Comparison) -> _Table:
     ]
     of = f"{_count(comparison.pictures, 'picture')} of {_count(comparison.groups, 'scene')}"
     columns = ("", *(result.candidate.label for result in results))
-    return _Table(f"Detectors on {comparison.material}: {of}", columns, rows, _caption(comparison))
+    return Table(f"Detectors on {comparison.material}: {of}", columns, rows, _caption(comparison))
 
 
 _FIGURES: Mapping[str, Callable[[TrialResult], float]] = MappingProxyType(
@@ -120,7 +94,7 @@ def _caption(comparison: Comparison) -> str:
     return " ".join(notes)
 
 
-def _by_class(comparison: Comparison) -> _Table:
+def _by_class(comparison: Comparison) -> Table:
     rows = []
     for cells, result, place in _class_rows(comparison):
         one, coco = result.score.classes[place], result.coco.classes[place]
@@ -130,10 +104,10 @@ def _by_class(comparison: Comparison) -> _Table:
     rows += [(_readable(name), *blank, "0", *[_NONE] * 5) for name in _without_truth(comparison)]
     columns = (*_head(comparison), "boxes", "AP11", "AP", "COCO AP", "AP50", "AP75")
     caption = "AP11: 11 points (Eq. 1). AP: all points. The others: COCO's."
-    return _Table("By class", columns, rows, caption, texts=len(_head(comparison)))
+    return Table("By class", columns, rows, caption, texts=len(_head(comparison)))
 
 
-def _at_best(comparison: Comparison) -> _Table:
+def _at_best(comparison: Comparison) -> Table:
     in_metres = any(result.ale_m for result in comparison.results)
     rows = []
     for cells, result, place in _class_rows(comparison):
@@ -146,10 +120,10 @@ def _at_best(comparison: Comparison) -> _Table:
     if in_metres:
         columns += ("ALE m",)
         caption += " ALE: Eq. 3."
-    return _Table("By class, at its best score", columns, rows, caption, texts=len(_head(comparison)))
+    return Table("By class, at its best score", columns, rows, caption, texts=len(_head(comparison)))
 
 
-def _by_height(comparison: Comparison) -> _Table:
+def _by_height(comparison: Comparison) -> Table:
     rows = []
     for cells, result, place in _class_rows(comparison):
         one = result.coco.classes[place]
@@ -160,10 +134,10 @@ def _by_height(comparison: Comparison) -> _Table:
         rows.append((*cells, *bands))
     columns = (*_head(comparison), *_bands())
     caption = "AP50 of boxes so tall in the picture, and how many there are."
-    return _Table("By class and height", columns, rows, caption, texts=len(_head(comparison)))
+    return Table("By class and height", columns, rows, caption, texts=len(_head(comparison)))
 
 
-def _points(comparison: Comparison) -> _Table:
+def _points(comparison: Comparison) -> Table:
     rows = []
     for result in comparison.results:
         for one, bands in zip(result.points.classes, result.points.by_height, strict=True):
@@ -189,17 +163,17 @@ def _points(comparison: Comparison) -> _Table:
         "Ground points of right boxes at the best score: median and 95 % of their errors in pixels, in heights of "
     )
     caption += "the box, in metres on the ground; how many lie in the ellipse in which 95 of 100 should."
-    return _Table("Where things stand", columns, rows, caption, texts=len(_head(comparison)) + 1)
+    return Table("Where things stand", columns, rows, caption, texts=len(_head(comparison)) + 1)
 
 
-def _at_thresholds(comparison: Comparison) -> _Table:
+def _at_thresholds(comparison: Comparison) -> Table:
     rows = [
         (*cells, f"{threshold:g}", *map(_number, result.score.classes[place].curve.at(threshold)))
         for threshold in comparison.thresholds
         for cells, result, place in _class_rows(comparison)
     ]
     columns = (*_head(comparison), "score", "precision", "recall")
-    return _Table("By class, at given scores", columns, rows, texts=len(_head(comparison)))
+    return Table("By class, at given scores", columns, rows, texts=len(_head(comparison)))
 
 
 def _class_rows(comparison: Comparison) -> Iterator[tuple[tuple[str, ...], TrialResult, int]]:

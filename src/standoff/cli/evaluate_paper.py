@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -183,11 +184,16 @@ def _evaluate(folder: Path, trial: Trial) -> ClipResult:
 def _as_json(results: Sequence[ClipResult], failures: Mapping[str, StandoffError]) -> dict[str, Any]:
     from standoff import __version__
     from standoff.evaluation.paper import pool
+    from standoff.evaluation.paper.answers import FrameByFrame
+    from standoff.evaluation.paper.warning_time import summarise
 
     pooled = pool(results)
+    answers = [result.answers for result in results if result.answers is not None]
     return {
         "standoff": __version__,
         "clips": [result.to_dict() for result in results],
         "map_only": None if pooled is None else pooled.to_dict(),
+        "frame_by_frame": FrameByFrame.together(answers).to_dict() if answers else None,
+        "warning_times": asdict(summarise([breach for result in results for breach in result.breaches])),
         "failed": [{"clip": name, "why": str(error)} for name, error in failures.items()],
     }

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from standoff.cli.answer_tables import print_answers, print_warning_times
 from standoff.cli.console import print_table
 
 if TYPE_CHECKING:
@@ -20,6 +21,8 @@ def print_results(results: Sequence[ClipResult]) -> None:
         _print_figures(result)
     _print_rectification(results)
     _print_distances(results)
+    print_answers(results)
+    print_warning_times(results)
     _print_benchmark(results)
     _print_map_only(results)
     facts = "; ".join(f"{name}: {value}" for name, value in results[0].trial.describe().items())
@@ -72,12 +75,14 @@ def _print_distances(results: Sequence[ClipResult]) -> None:
             pair = machine + (f" x{group.pairs}" if group.pairs > 1 else "")
             numbers = (before.made_m, after.made_m, after.mape_percent, after.median_m)
             name = "" if index else result.clip.name
-            rows.append((name, pair, f"{after.measured}/{after.frames}", *map(number_text, numbers)))
+            inside = f"{_percent(group.coverage.inside_68)}, {_percent(group.coverage.inside_95)}"
+            rows.append((name, pair, f"{after.measured}/{after.frames}", *map(number_text, numbers), inside))
     if rows:
-        columns = ("clip", "machine", "measured", "before", "after", "after %", "median")
+        columns = ("clip", "machine", "measured", "before", "after", "after %", "median", "inside %")
         caption = (
-            "Against exact truth, m: MADE before and after the outlier filter, MAPE (%) and median residual after it. "
-            "Measured: of the frames of all pairs of the kind."
+            "Against exact truth, m: MADE before and after the outlier filter, MAPE (%) and median residual after it; "
+            "inside: share (%) whose truth is within 1 and 1.96 stated standard errors. Measured: of the frames of all "
+            "pairs of the kind."
         )
         print_table("Distances of workers from machines", columns, rows, caption, texts=2)
 
@@ -112,6 +117,10 @@ _MAP_FIGURES = (
 
 def _map_figures(figures: MapFigures) -> list[str]:
     return [_map_number(name, getattr(figures, name)) for name, _ in _MAP_FIGURES]
+
+
+def _percent(share: float) -> str:
+    return "none" if math.isnan(share) else f"{100 * share:.0f}"
 
 
 def _map_number(name: str, value: float) -> str:

@@ -13,15 +13,16 @@ from typing import Any, Literal
 import numpy as np
 
 from standoff.config import Settings
-from standoff.core.classes import CLASSES
 from standoff.core.errors import DataError
 from standoff.core.types import FrameResult, Severity
+from standoff.evaluation.matching import NOTHING
+from standoff.evaluation.paper.answers import both_radii_m
 from standoff.evaluation.paper.clip import Clip
 from standoff.evaluation.paper.localisation import ClassScore, score_localisation
 from standoff.evaluation.paper.map_only import MapScore, score_map
 from standoff.evaluation.paper.pairs import PairGroup, group_pairs, pair_series
 from standoff.evaluation.paper.trial import Trial, build_monitor, settings_for
-from standoff.evaluation.paper.watch import NOTHING, Notes, open_clip_video
+from standoff.evaluation.paper.watch import Notes, open_clip_video
 
 Pair = tuple[int, int]
 Kind = Literal["near miss", "breach"]
@@ -142,7 +143,6 @@ class ClipWitness:
             )
         self._clip, self._settings, self._reference = clip, settings, clip.reference
         self._notes = Notes(clip, settings.ground.reference.shape(), size_px, true_ids=False)
-        self._time_s = np.full(clip.frame_count, np.nan)
         self._entities: dict[int, Counter[int]] = {}
         self._said: dict[str, _Said] = {}
 
@@ -153,7 +153,6 @@ class ClipWitness:
 
     def take(self, result: FrameResult) -> None:
         """Take the next frame."""
-        self._time_s[result.frame.index] = result.frame.time_s
         track_row = self._notes.take(result)
         for entity in np.flatnonzero(track_row != NOTHING).tolist():
             track = int(result.tracks.track_id[track_row[entity]])
@@ -174,10 +173,14 @@ class ClipWitness:
             frames_with_map=int(np.isfinite(watched.scale_m_per_px).sum()),
             map_only=score_map(clip, watched),
             classes=score_localisation(clip, watched),
-            pairs=group_pairs(pair_series(clip, watched, benchmark=False)),
+            pairs=self.score_pairs(),
             encounters=tuple(encounters),
             false_hazards=tuple(self._false_hazards(said, encounters)),
         )
+
+    def score_pairs(self) -> tuple[PairGroup, ...]:
+        """Compare the distances alone."""
+        return group_pairs(pair_series(self._clip, self._notes.watched, benchmark=False))
 
     def _said_of_entities(self) -> dict[Pair, dict[Severity, float]]:
         """Return when each severity was first said of each pair of entities, or of NOTHING known."""
@@ -196,13 +199,13 @@ class ClipWitness:
 
     def _encounters(self, said: dict[Pair, dict[Severity, float]]) -> Iterator[Encounter]:
         names, hazard = self._clip.names(), self._settings.hazard
-        for pair, distance_m in zip(self._clip.pairs.tolist(), self._clip.distance_m.T, strict=True):
-            gap_m = distance_m - sum(self._radius_m(entity) for entity in pair)
+        gaps_m = self._clip.distance_m - both_radii_m(self._clip, self._settings)
+        for pair, gap_m in zip(self._clip.pairs.tolist(), gaps_m.T, strict=True):
             least_m = float(np.nanmin(gap_m))
             if least_m >= hazard.buffer_m:
                 continue
             kind: Kind = "breach" if least_m < 0.0 else "near miss"
-            close_s = self._time_s[gap_m < (0.0 if kind == "breach" else hazard.buffer_m)]
+            close_s = self._notes.watched.time_s[gap_m < (0.0 if kind == "breach" else hazard.buffer_m)]
             of_pair = said.get((min(pair), max(pair)), {})
             worst = _worst(of_pair)
             yield Encounter(
@@ -214,10 +217,6 @@ class ClipWitness:
                 said=worst,
                 said_s=of_pair[worst] if worst else np.nan,
             )
-
-    def _radius_m(self, entity: int) -> float:
-        site_class = CLASSES[self._clip.class_id[entity]]
-        return self._settings.locate.radius_m.get(site_class.name, site_class.action_radius_m)
 
     def _false_hazards(self, said: dict[Pair, dict[Severity, float]], encounters: Sequence[Encounter]) -> Iterator[str]:
         names = [*self._clip.names(), "nothing"]

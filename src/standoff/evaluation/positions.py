@@ -20,7 +20,6 @@ Precision is a lower bound wherever not everybody is labelled: a track on somebo
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -30,6 +29,8 @@ from standoff.core.boxes import overlaps
 from standoff.core.errors import DataError
 from standoff.core.homography import FloatArray
 from standoff.core.types import IntArray
+from standoff.evaluation.matching import NOTHING
+from standoff.evaluation.pair_rows import distances_of
 from standoff.evaluation.positions_input import (
     PAIR_COLUMNS,
     TRACK_COLUMNS,
@@ -42,10 +43,6 @@ from standoff.stages.track.association import assign
 
 NOTE = "Precision is a lower bound where not everybody is labelled. Missed truth and unmeasured pairs are counted."
 _MAX_GROUND_M = 2.0
-_NO_TRACK = -1
-
-_Distances = Mapping[tuple[int, int, int], tuple[float, float]]
-"""Distance and standard error, NaN where not measured, by frame index and both track ids, the smaller first."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,10 +197,10 @@ def score_positions(
         tracks = chosen_rows(tracks, np.isfinite(tracks["x_m"]) & np.isfinite(tracks["y_m"]))
     elif np.isnan(truth["x"]).all():
         raise DataError(expected="truth with boxes", found="none", fix="leave out --min-overlap to match on the ground")
-    distances = _by_pair(chosen_rows(pairs, np.isin(pairs["frame"] + 1, scored)))
+    pairs = chosen_rows(pairs, np.isin(pairs["frame"] + 1, scored))
     observed = chosen_rows(tracks, tracks["observed"].astype(np.bool_))
     (entities, pair_score), (observed_entities, observed_pairs) = (
-        _score(truth, rows, _match(truth, rows, min_overlap), distances, pairs_up_to_m) for rows in (tracks, observed)
+        _score(truth, rows, _match(truth, rows, min_overlap), pairs, pairs_up_to_m) for rows in (tracks, observed)
     )
     return PositionsResult(
         first_frame=int(scored[0]),
@@ -219,29 +216,22 @@ def score_positions(
     )
 
 
-def _by_pair(pairs: Columns) -> _Distances:
-    measured = pairs["measured"].astype(np.bool_)
-    keys = zip(pairs["frame"].tolist(), pairs["track_a"].tolist(), pairs["track_b"].tolist(), strict=True)
-    distance_m, sigma_m = (np.where(measured, pairs[name], np.nan).tolist() for name in ("distance_m", "sigma_m"))
-    return dict(zip(keys, zip(distance_m, sigma_m, strict=True), strict=True))
-
-
 def _score(
-    truth: Columns, tracks: Columns, track_row: IntArray, distances: _Distances, pairs_up_to_m: float
+    truth: Columns, tracks: Columns, track_row: IntArray, pairs: Columns, pairs_up_to_m: float
 ) -> tuple[EntityScore, PairScore]:
     is_scored = truth["conf"] > 0
-    ignored_tracks = int((track_row[~is_scored] != _NO_TRACK).sum())
+    ignored_tracks = int((track_row[~is_scored] != NOTHING).sum())
     truth, track_row = chosen_rows(truth, is_scored), track_row[is_scored]
     entities = _score_entities(truth, tracks, track_row, len(tracks["frame"]) - ignored_tracks)
-    found = track_row != _NO_TRACK
-    track_id = np.full(len(track_row), _NO_TRACK)
+    found = track_row != NOTHING
+    track_id = np.full(len(track_row), NOTHING)
     track_id[found] = tracks["track_id"][track_row[found]]
-    return entities, _score_pairs(truth, track_id, distances, pairs_up_to_m)
+    return entities, _score_pairs(truth, track_id, pairs, pairs_up_to_m)
 
 
 def _match(truth: Columns, tracks: Columns, min_overlap: float | None) -> IntArray:
     """Return for every truth row the row of its track, or -1."""
-    track_row = np.full(len(truth["frame"]), _NO_TRACK)
+    track_row = np.full(len(truth["frame"]), NOTHING)
     similarity, at_least = (_nearness, 1.0 / (1.0 + _MAX_GROUND_M)) if min_overlap is None else (_overlap, min_overlap)
     for frame in np.unique(truth["frame"]):
         rows, columns = np.flatnonzero(truth["frame"] == frame), np.flatnonzero(tracks["frame"] == frame - 1)
@@ -264,7 +254,7 @@ def _nearness(truth: Columns, tracks: Columns) -> FloatArray:
 
 
 def _score_entities(truth: Columns, tracks: Columns, track_row: IntArray, track_count: int) -> EntityScore:
-    found = track_row != _NO_TRACK
+    found = track_row != NOTHING
     rows, count = track_row[found], int(found.sum())
     error_m = np.hypot(tracks["x_m"][rows] - truth["X"][found], tracks["y_m"][rows] - truth["Y"][found])
     error_m = error_m[np.isfinite(error_m)]
@@ -281,22 +271,20 @@ def _score_entities(truth: Columns, tracks: Columns, track_row: IntArray, track_
     )
 
 
-def _score_pairs(truth: Columns, track_id: IntArray, distances: _Distances, pairs_up_to_m: float) -> PairScore:
+def _score_pairs(truth: Columns, track_id: IntArray, pairs: Columns, pairs_up_to_m: float) -> PairScore:
     first, second = _rows_of_pairs(truth["frame"])
     true_m = np.hypot(truth["X"][first] - truth["X"][second], truth["Y"][first] - truth["Y"][second])
     scored = (true_m > 0) & (true_m <= pairs_up_to_m)
     first, second, true_m = first[scored], second[scored], true_m[scored]
     frame = (truth["frame"][first] - 1).astype(np.int64)
-    smaller, larger = np.sort([track_id[first], track_id[second]], axis=0)
-    keys = list(zip(frame.tolist(), smaller.tolist(), larger.tolist(), strict=True))
-    if (smaller != _NO_TRACK).any() and not any(key in distances for key in keys):
+    ends = track_id[first], track_id[second]
+    measured_m, sigma_m, listed = distances_of(pairs, frame, *ends)
+    if (np.minimum(*ends) != NOTHING).any() and not listed.any():
         raise DataError(
             expected="distances between the tracks that the truth shows",
             found="no such pair in the run's proximity table",
             fix="repeat the run with these classes among proximity.pairs, for people worker and worker",
         )
-    unmeasured = (np.nan, np.nan)
-    measured_m, sigma_m = np.array([distances.get(key, unmeasured) for key in keys]).reshape(-1, 2).T
     measured = np.isfinite(measured_m)
     error_m = (measured_m - true_m)[measured]
     return PairScore(

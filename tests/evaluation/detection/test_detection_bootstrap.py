@@ -9,7 +9,8 @@ from evaluation.detection.drawn_detections import CLASSES, random_scenes
 
 from standoff.core.types import Detections
 from standoff.evaluation.detection import score_detections
-from standoff.evaluation.detection.bootstrap import LEAST_GROUPS, resample_groups
+from standoff.evaluation.detection.bootstrap import resample_groups
+from standoff.evaluation.resampling import LEAST_GROUPS
 from standoff.labels import LabelledPicture
 
 SEEDS = range(4)

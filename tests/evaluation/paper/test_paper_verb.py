@@ -77,6 +77,25 @@ def test_failed_frames_are_counted_as_failed_whatever_fills_them(measured: dict[
         assert sum(group["missing_by_reason"].values()) == hidden + unseen[name]
 
 
+def test_the_stated_errors_of_distances_are_checked(measured: dict[str, Any]) -> None:
+    for group in measured["pairs"]:
+        coverage = group["coverage"]
+        assert 0.0 <= coverage["inside_68"] <= coverage["inside_95"] <= 1.0
+        assert 0.0 < coverage["sigma_m"] < 3.0
+        assert coverage["observed"] == sorted(coverage["observed"])
+
+
+def test_answers_are_scored_in_every_frame_in_which_a_pair_can_be_seen(measured: dict[str, Any]) -> None:
+    frames, hidden, unseen = drawn_clip.FRAMES, len(drawn_clip.HIDDEN), len(drawn_clip.UNSEEN)
+    for answers in (measured["frame_by_frame"]["measured"], measured["frame_by_frame"]["said"]):
+        assert sum(map(sum, answers["counts"])) == 2 * frames - unseen
+        assert answers["answers"][3]["said"] == 2 * hidden
+        assert answers["unknown_share"] == pytest.approx(2 * hidden / (2 * frames - unseen))
+    # An excavator's and a worker's radii add up to 14.1 m, a loader's to 7.8 m: the excavator is in breach throughout.
+    assert [one["from_start"] for one in measured["breaches"]].count(True) >= 1
+    assert measured["frame_by_frame"]["measured"]["answers"][0]["recall"] > 0.8
+
+
 def test_the_papers_benchmark_is_scored_against_truth_as_well(measured: dict[str, Any]) -> None:
     for group in measured["pairs"]:
         benchmark = group["scores"]["benchmark itself"]
@@ -168,6 +187,7 @@ def test_one_page_shows_it_all(clip_folder: Path, board_folder: Path, tmp_path: 
     assert "data:image/jpeg;base64," in page
     assert not re.search(r"(src|href)=\"(?!data:|#)", page)
     said = without_pictures(page)
+    assert "frame by frame" in said and "inside 95 %" in said and "had begun with the clip" in said
     assert "93.51 %" in said and "37 frames" in said and "too few edges" in said
     assert "nan" not in said.lower()
 

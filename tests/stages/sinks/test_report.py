@@ -72,6 +72,21 @@ def test_no_number_reads_nan(tmp_path: Path, results: list[FrameResult]) -> None
     assert "unknown worker 1 and worker 2 0:00.0 open 0:06.0 unknown unknown outside" in PageReader.of(page).text
 
 
+def test_errors_that_nobody_checked_are_said_to_be_unchecked(tmp_path: Path, results: list[FrameResult]) -> None:
+    for name, checked in (("never", None), ("broken off", lambda: "")):
+        (folder := tmp_path / name).mkdir()
+        text = PageReader.of(_page(folder, results[:5], params=_PLAIN, checked=checked)).text
+        assert text.count("not checked on your site") == 1
+        assert "checked against the truth" not in text
+
+
+def test_errors_that_were_checked_against_truth_are_shown(tmp_path: Path, results: list[FrameResult]) -> None:
+    section = '<section id="checked"><h2>How true the stated errors are</h2></section>'
+    page = _page(tmp_path, results[:5], params=_PLAIN, checked=lambda: section)
+    assert page.count(section) == 1 and page.count('href="#checked"') == 1
+    assert "not checked" not in PageReader.of(page).text
+
+
 def test_an_interrupted_run_says_so_at_the_top(tmp_path: Path, results: list[FrameResult]) -> None:
     text = PageReader.of(
         _page(tmp_path, results[:40], Outcome("interrupted", "stopped by the operator"), params=_PLAIN)

@@ -11,11 +11,7 @@ from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import IntArray
 from standoff.evaluation.detection.curve import eleven_point_ap
 from standoff.evaluation.detection.matching import NOTHING, Matches
-
-LEAST_GROUPS = 5
-"""With fewer groups the interval says more about the bootstrap than about the detector."""
-RESAMPLES = 1000
-_TAILS_PERCENT = (2.5, 97.5)
+from standoff.evaluation.resampling import LEAST_GROUPS, RESAMPLES, draw_groups, interval_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,24 +55,14 @@ def resample_groups(
 
     Returns:
         None with fewer than `LEAST_GROUPS` groups, or nothing to find.
-
-    Source:
-        Efron and Tibshirani, An Introduction to the Bootstrap (1993), chapters 8 and 13: the percentile interval of
-        whole clusters.
     """
     names, group_of = np.unique(np.asarray(groups, dtype=np.str_), return_inverse=True)
     if len(names) < LEAST_GROUPS or not len(models[0].truth_px):
         return None
-    rng = np.random.default_rng(seed)
-    draws = rng.multinomial(len(names), np.full(len(names), 1.0 / len(names)), size=resamples)
+    draws = draw_groups(len(names), resamples=resamples, seed=seed)
     means = np.array([_mean_ap11(one, group_of, draws) for one in models])
-    difference = _interval(means[1] - means[0]) if len(models) > 1 else None
-    return Chance(len(names), tuple(_interval(values) for values in means), difference)
-
-
-def _interval(values: FloatArray) -> Interval:
-    low, high = np.nanpercentile(values, _TAILS_PERCENT)
-    return Interval(float(low), float(high))
+    difference = Interval(*interval_of(means[1] - means[0])) if len(models) > 1 else None
+    return Chance(len(names), tuple(Interval(*interval_of(values)) for values in means), difference)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

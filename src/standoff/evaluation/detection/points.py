@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
@@ -14,10 +14,8 @@ from standoff.core.types import IntArray
 from standoff.evaluation.detection.coco import HEIGHT_BANDS_PX
 from standoff.evaluation.detection.matching import Matches
 from standoff.evaluation.detection.score import DetectionScore, right_from
+from standoff.evaluation.stated_errors import plane_sigmas, plane_sigmas2_around
 from standoff.labels.views import GroundView
-
-INSIDE: Final = -2.0 * math.log(0.05)
-"""Squared distance in standard errors within which 95 of 100 points of a plane lie: chi-square with 2 degrees."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +125,7 @@ def _errors(matches: Matches, rows: IntArray, views: Mapping[int, GroundView]) -
     truth = matches.truth_row[rows]
     true_px, box_px = matches.truth_foot_px[truth], matches.truth_px[truth]
     off_px = matches.foot_px[rows] - true_px
-    solved = np.linalg.solve(matches.foot_covariance_px2[rows], off_px[:, :, None])[:, :, 0]
+    sigmas = plane_sigmas(off_px, matches.foot_covariance_px2[rows])
     left, _, right, bottom = matches.xyxy_px[rows].T
     anchor_px = np.column_stack([(left + right) / 2.0, bottom])
     distance_m, anchor_m = np.full(len(rows), np.nan), np.full(len(rows), np.nan)
@@ -142,7 +140,7 @@ def _errors(matches: Matches, rows: IntArray, views: Mapping[int, GroundView]) -
         height_px=box_px[:, 3] - box_px[:, 1],
         distance_m=distance_m,
         anchor_m=anchor_m,
-        is_inside=np.asarray((solved * off_px).sum(axis=1) <= INSIDE),
+        is_inside=np.asarray(sigmas**2 <= plane_sigmas2_around(0.95)),
     )
 
 

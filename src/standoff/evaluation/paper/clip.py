@@ -127,7 +127,7 @@ def load_clip(folder: Path | str) -> Clip:
         DataError: A file is missing or not what it should be, or the clip shows nothing that the paper's tests need.
     """
     folder = Path(folder)
-    scene = _read_scene(folder)
+    scene = read_scene(folder)
     for name in ("video.mp4", "camera.yaml", "reference.yaml"):
         if not (folder / name).is_file():
             raise DataError(expected=f"{name} in the clip", found=f"no {folder / name}", fix=_FIX)
@@ -161,7 +161,12 @@ def inside(reference: TrueReference, size_px: tuple[int, int]) -> BoolArray:
     return np.asarray(in_picture.all(axis=(1, 2)), dtype=np.bool_)
 
 
-def _read_scene(folder: Path) -> Mapping[str, Any]:
+def read_scene(folder: Path) -> Mapping[str, Any]:
+    """Read what a clip shows.
+
+    Raises:
+        DataError: There is no such file, or it is not what it should be.
+    """
     path = folder / SCENE
     if not path.is_file():
         fix = "give the folder that `standoff simulate` wrote"

@@ -15,15 +15,13 @@ from standoff.core.homography import FloatArray
 from standoff.evaluation.paper.clip import Clip, inside
 from standoff.evaluation.paper.mapped_points import MappedPoints
 from standoff.evaluation.paper.watch import Watched
+from standoff.evaluation.stated_errors import plane_sigmas, plane_sigmas2_around
 
 NEAR_M = 20.0
 """Points within this distance of the reference's middle count."""
 
 WRONG_M, WRONG_SIGMAS = 0.5, 5.0
 """Off by more than both is wrong and believed: an error that matters, and that the stated one does not cover."""
-
-_INSIDE = -2.0 * np.log(0.05)
-"""Squared distance in standard errors within which 95 % of a normal distribution in the plane lie."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,10 +96,9 @@ def map_samples(clip: Clip, watched: Watched, mapped: MappedPoints) -> MapSample
     measured = counts & np.isfinite(mapped.xy_m).all(axis=2)
     off_m = (mapped.xy_m - clip.xy_m)[measured]
     covariance_m2 = mapped.covariance_m2[measured]
-    inverse = np.linalg.pinv(covariance_m2, hermitian=True)
     return MapSamples(
         error_m=np.linalg.norm(off_m, axis=1),
-        sigmas=np.sqrt(np.einsum("ni,nij,nj->n", off_m, inverse, off_m)),
+        sigmas=plane_sigmas(off_m, covariance_m2),
         sigma_m=np.sqrt(np.trace(covariance_m2, axis1=1, axis2=2) / 2.0),
         beyond=int((counts & ~measured).sum()),
     )
@@ -121,7 +118,7 @@ def figures_of(samples: Sequence[MapSamples]) -> MapFigures:
         median_m=float(np.median(error_m)),
         p95_m=float(np.percentile(error_m, 95)),
         worst_m=float(error_m.max()),
-        inside_share=float((sigmas**2 <= _INSIDE).mean()),
+        inside_share=float((sigmas**2 <= plane_sigmas2_around(0.95)).mean()),
         believed_wrong_share=float(((error_m > WRONG_M) & (sigmas > WRONG_SIGMAS)).mean()),
         sigma_m=float(np.median(sigma_m)),
     )

@@ -16,6 +16,7 @@ from standoff.evaluation.paper.clip import Clip
 from standoff.evaluation.paper.metrics import DistanceScore, fill_as_the_filter, score_distances
 from standoff.evaluation.paper.rectified import failed_frames
 from standoff.evaluation.paper.watch import Watched
+from standoff.evaluation.stated_errors import Coverage, score_coverage
 from standoff.stages.proximity import ProximityParams
 
 BEFORE = "before the filter"
@@ -36,6 +37,7 @@ class PairSeries:
         truth_m: Exact; NaN where the truth has no such pair.
         before_m: As measured; NaN where not.
         after_m: After the outlier filter; NaN where not measured.
+        sigma_m: Standard error that is stated for it; NaN with it.
         filled_m: The same with failed rectifications replaced as the paper's filter does.
         failed: Frames whose rectification failed.
         reason: Why there is no estimate; empty where there is one, and where the truth has none.
@@ -47,6 +49,7 @@ class PairSeries:
     truth_m: FloatArray
     before_m: FloatArray
     after_m: FloatArray
+    sigma_m: FloatArray
     filled_m: FloatArray
     failed: BoolArray
     reason: TextArray
@@ -70,12 +73,14 @@ class PairGroup:
         class_pair: "worker-excavator".
         pairs: How many.
         scores: By what is compared.
+        coverage: How true the stated errors of the distances after the filter are.
         missing_by_reason: Frames without an estimate, by cause.
     """
 
     class_pair: str
     pairs: int
     scores: Mapping[str, DistanceScore]
+    coverage: Coverage
     missing_by_reason: Mapping[str, int]
 
 
@@ -114,6 +119,7 @@ def _one_series(
         truth_m=clip.distance_m[:, column],
         before_m=before_m,
         after_m=after_m,
+        sigma_m=watched.sigma_m[:, column],
         filled_m=fill_as_the_filter(after_m, failed & ~np.isfinite(watched.scale_m_per_px)),
         failed=failed,
         reason=reason,
@@ -136,5 +142,6 @@ def group_pairs(series: tuple[PairSeries, ...]) -> tuple[PairGroup, ...]:
             scores[AGAINST_BENCHMARK] = replace(scores[AGAINST_BENCHMARK], frames=scores[AFTER].frames)
         reasons = np.concatenate([one.reason for one in own])
         missing = dict(Counter(reasons[reasons != ""].tolist()).most_common())
-        groups.append(PairGroup(class_pair, len(own), scores, missing))
+        series_m = [np.concatenate([getattr(one, name) for one in own]) for name in ("truth_m", "after_m", "sigma_m")]
+        groups.append(PairGroup(class_pair, len(own), scores, score_coverage(*series_m), missing))
     return tuple(groups)

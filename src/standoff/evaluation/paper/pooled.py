@@ -11,10 +11,9 @@ import numpy as np
 from standoff.core.homography import FloatArray
 from standoff.evaluation.paper.map_only import MapFigures, MapSamples, figures_of, map_samples
 from standoff.evaluation.paper.result import ClipResult
+from standoff.evaluation.resampling import RESAMPLES, interval_of
 
-RESAMPLES = 1000
 _SEED = 0
-_PERCENTILES = (2.5, 97.5)
 _FIGURES = ("median_m", "p95_m", "worst_m", "inside_share", "believed_wrong_share", "sigma_m")
 
 Interval = tuple[float, float]
@@ -93,10 +92,4 @@ def _together(clips: Sequence[_OfClip]) -> dict[str, float]:
 def _intervals(clips: Sequence[_OfClip]) -> dict[str, Interval]:
     rng = np.random.default_rng(_SEED)
     drawn = [_together([clips[k] for k in rng.integers(len(clips), size=len(clips))]) for _ in range(RESAMPLES)]
-    found = {}
-    for name in drawn[0]:
-        values = np.array([one[name] for one in drawn])
-        known = values[np.isfinite(values)]
-        low, high = np.percentile(known, _PERCENTILES) if len(known) else (np.nan, np.nan)
-        found[name] = (float(low), float(high))
-    return found
+    return {name: interval_of(np.array([one[name] for one in drawn])) for name in drawn[0]}

@@ -16,6 +16,7 @@ from markupsafe import Markup
 
 from standoff import __version__
 from standoff.core.errors import OutputError
+from standoff.evaluation.paper.answers import UP_TO_M
 from standoff.evaluation.paper.benchmark_polynomial import DEGREE, KEPT_SD, MEDIAN_FRAMES
 from standoff.evaluation.paper.captions import ISOLATES, board_caption, number_text, pair_caption, published_for
 from standoff.evaluation.paper.figures import ESTIMATE, RAW, TREND, board_chart, corner_chart, pair_chart
@@ -70,6 +71,7 @@ def render(results: Sequence[ClipResult], failures: Mapping[str, Exception]) -> 
         failures=failures,
         pooled=pool(results),
         near_m=NEAR_M,
+        up_to_m=UP_TO_M,
         isolates=ISOLATES,
         after=AFTER,
         before=BEFORE,
@@ -96,6 +98,8 @@ def _section(result: ClipResult) -> dict[str, Any]:
         "map_only": result.map_only,
         "localisation": result.localisation,
         "groups": result.groups,
+        "answers": result.answers,
+        "breaches": result.breaches,
         "board": result.board,
         "corner_chart": Markup(corners),
         "board_chart": Markup(board_chart(result.board) if result.board else ""),

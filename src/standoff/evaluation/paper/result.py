@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from standoff.evaluation.paper.answers import FrameByFrame, score_frames
 from standoff.evaluation.paper.board import BoardScore, score_board, watch_board
 from standoff.evaluation.paper.clip import Clip
 from standoff.evaluation.paper.localisation import ClassScore, score_localisation
@@ -25,7 +26,8 @@ from standoff.evaluation.paper.pairs import (
 )
 from standoff.evaluation.paper.published import BENCHMARK_PRESETS, PUBLISHED
 from standoff.evaluation.paper.rectified import RectificationScore, score_rectification
-from standoff.evaluation.paper.trial import Trial
+from standoff.evaluation.paper.trial import Trial, settings_for
+from standoff.evaluation.paper.warning_time import Breach, find_breaches
 from standoff.evaluation.paper.watch import Watched, watch
 
 
@@ -72,6 +74,8 @@ class ClipResult:
         localisation: By class.
         groups: Of pairs, by class.
         series: Of each pair.
+        answers: Danger, warning, clear or unknown in every frame; None without a reference object.
+        breaches: In the order of time, and how long before each of them it was said.
         board: None without a checkerboard.
     """
 
@@ -83,6 +87,8 @@ class ClipResult:
     localisation: tuple[ClassScore, ...] = ()
     groups: tuple[PairGroup, ...] = ()
     series: tuple[PairSeries, ...] = ()
+    answers: FrameByFrame | None = None
+    breaches: tuple[Breach, ...] = ()
     board: BoardScore | None = None
 
     def figures(self) -> tuple[PaperFigure, ...]:
@@ -103,6 +109,8 @@ class ClipResult:
             "map_only": None if self.map_only is None else asdict(self.map_only),
             "localisation": [asdict(score) for score in self.localisation],
             "pairs": [asdict(group) for group in self.groups],
+            "frame_by_frame": None if self.answers is None else self.answers.to_dict(),
+            "breaches": [asdict(one) for one in self.breaches],
             "board": None if self.board is None else asdict(self.board),
         }
 
@@ -121,7 +129,7 @@ def evaluate_clip(clip: Clip, trial: Trial, on_frame: Callable[[], None] | None 
     if clip.board is not None:
         return ClipResult(clip, trial, board=score_board(clip, clip.board, watch_board(clip, clip.board, on_frame)))
     assert clip.reference is not None, "checked in load_clip"
-    watched = watch(clip, trial, on_frame)
+    watched, settings = watch(clip, trial, on_frame), settings_for(clip, trial)
     series = pair_series(clip, watched, benchmark=clip.preset in BENCHMARK_PRESETS)
     return ClipResult(
         clip=clip,
@@ -132,6 +140,8 @@ def evaluate_clip(clip: Clip, trial: Trial, on_frame: Callable[[], None] | None 
         localisation=score_localisation(clip, watched),
         groups=group_pairs(series),
         series=series,
+        answers=score_frames(clip, watched, settings),
+        breaches=find_breaches(clip, watched, settings),
     )
 
 

@@ -41,6 +41,13 @@ class Turning:
         best = min(errors, key=lambda turn: float(errors[turn].max()))
         return errors[best], best
 
+    def nearest(self, points_m: FloatArray, true_m: FloatArray) -> int:
+        """Return the turn for `to_site` that brings (N, 2) positions nearest to their true places, N > 0."""
+        return min(
+            self._turns,
+            key=lambda turn: float(np.median(np.linalg.norm(self.to_site(points_m, turn) - true_m, axis=1))),
+        )
+
     def to_site(self, points_m: FloatArray, turn: int) -> FloatArray:
         """Turn (..., 2) positions about the reference's middle so that its corners lie where the truth has them."""
         middle = self._shape_m.mean(axis=0)

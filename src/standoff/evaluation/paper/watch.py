@@ -9,13 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
-from standoff.core.boxes import overlaps
-from standoff.core.classes import CLASSES
 from standoff.core.errors import DataError
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import FrameResult, GroundMap, IntArray, NoGroundMap, TextArray
+from standoff.evaluation.matching import NOTHING, match_boxes
 from standoff.evaluation.paper.clip import Clip, inside
 from standoff.evaluation.paper.mapped_points import MappedPoints, level_feet_px
+from standoff.evaluation.paper.said import SaidOfPairs
 from standoff.evaluation.paper.snapshots import Snapshots
 from standoff.evaluation.paper.trial import Trial, build_monitor, settings_for
 from standoff.evaluation.paper.truth_detector import without_reference
@@ -23,21 +23,13 @@ from standoff.evaluation.paper.turning import Turning
 from standoff.evaluation.rectification import FAILURE_PX
 from standoff.stages.frames import Source, open_source
 from standoff.stages.ground import ReferenceShape
-from standoff.stages.track.association import assign
 
 NOT_VISIBLE = "not visible"
 NOT_DETECTED = "not detected"
 NOT_BY_REFERENCE = "measured by the drone's telemetry alone"
 WRONG = f"a corner is more than {FAILURE_PX:g} px off"
-MIN_OVERLAP = 0.3
-"""Smallest IoU of a box with the truth's for the two to be the same thing."""
-
 _ELSEWHERE = "telemetry"
 """The method of maps whose site frame is not the reference's."""
-
-_ROLE = np.array([site_class.role.value for site_class in CLASSES])
-NOTHING = -1
-"""In place of a row where there is none."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,7 +44,11 @@ class Watched:
         annotated_m: (F, E, 2) centres of the true boxes through the frame's own map; NaN without a map.
         true_feet: The true footprints' centres, where the picture shows them, through the frame's own map.
         level_feet: The same where the picture would show them if the ground were level.
+        time_s: (F,) presentation timestamps; NaN where the run has no such frame.
         distance_m: (F, P) after the outlier filter; NaN where not measured.
+        sigma_m: (F, P) standard error that is stated for it; NaN with it.
+        said: (F, P) worst severity of the pair's hazards, "unknown" while it is not measured; empty without one.
+        alarmed: (F, P) whether a hazard of severity warning or danger is open.
         no_map: (F,) why there is no map; empty where there is one.
         carried: (F,) whether the map comes from earlier frames while a corner of the reference is outside the picture.
         scale_m_per_px: (F,) of the map (Eq. 6); NaN without.
@@ -68,7 +64,11 @@ class Watched:
     annotated_m: FloatArray
     true_feet: MappedPoints
     level_feet: MappedPoints
+    time_s: FloatArray
     distance_m: FloatArray
+    sigma_m: FloatArray
+    said: TextArray
+    alarmed: BoolArray
     no_map: TextArray
     carried: BoolArray
     scale_m_per_px: FloatArray
@@ -80,6 +80,7 @@ class Watched:
     def blank(cls, clip: Clip, size_px: tuple[int, int]) -> Watched:
         """Return arrays to be filled in."""
         frames, entities = clip.box_px.shape[:2]
+        by_pair = frames, len(clip.pairs)
         return cls(
             size_px=size_px,
             detected_px=np.full((frames, entities, 4), np.nan),
@@ -88,7 +89,11 @@ class Watched:
             annotated_m=np.full((frames, entities, 2), np.nan),
             true_feet=MappedPoints.blank(frames, entities),
             level_feet=MappedPoints.blank(frames, entities),
-            distance_m=np.full((frames, len(clip.pairs)), np.nan),
+            time_s=np.full(frames, np.nan),
+            distance_m=np.full(by_pair, np.nan),
+            sigma_m=np.full(by_pair, np.nan),
+            said=np.full(by_pair, "", dtype=object),
+            alarmed=np.zeros(by_pair, dtype=np.bool_),
             no_map=np.full(frames, "", dtype=object),
             carried=np.zeros(frames, dtype=np.bool_),
             scale_m_per_px=np.full(frames, np.nan),
@@ -175,6 +180,7 @@ class Notes:
         self._turn = 0
         self._turning = Turning(shape, clip.reference.corners_m)
         self._true_ids = true_ids
+        self._said = SaidOfPairs(clip.pairs)
 
     def take(self, result: FrameResult) -> IntArray:
         """File a frame.
@@ -184,14 +190,16 @@ class Notes:
         """
         frame, watched = result.frame.index, self.watched
         self.taken += 1
+        watched.time_s[frame] = result.frame.time_s
         watched.ground_s[frame] = result.stage_ms["ground"] / 1e3
         turn = self._take_map(result)
         tracks, detections = result.tracks, without_reference(result.detections)
         if self._true_ids:
             track_row = detection_row = self._rows_by_id(tracks.track_id)
         else:
-            track_row = self._rows_by_overlap(frame, tracks.xyxy_px, tracks.class_id)
-            detection_row = self._rows_by_overlap(frame, detections.xyxy_px, detections.class_id)
+            true_px, true_class = self._clip.box_px[frame], self._clip.class_id
+            track_row = match_boxes(true_px, true_class, tracks.xyxy_px, tracks.class_id)
+            detection_row = match_boxes(true_px, true_class, detections.xyxy_px, detections.class_id)
         detected, tracked = detection_row != NOTHING, track_row != NOTHING
         watched.detected_px[frame, detected] = detections.xyxy_px[detection_row[detected]]
         if watched.no_map[frame] == NOT_BY_REFERENCE:
@@ -204,6 +212,10 @@ class Notes:
         watched.reason[frame, ~tracked] = NOT_DETECTED
         watched.reason[frame, np.isnan(self._clip.box_px[frame]).any(axis=1)] = NOT_VISIBLE
         self._take_distances(result, track_row)
+        entity_of = dict(
+            zip(tracks.track_id[track_row[tracked]].tolist(), np.flatnonzero(tracked).tolist(), strict=True)
+        )
+        watched.said[frame], watched.alarmed[frame] = self._said.take(result.hazards, entity_of)
         return track_row
 
     def _take_map(self, result: FrameResult) -> int:
@@ -241,23 +253,14 @@ class Notes:
         for column, ends in enumerate(self._clip.pairs):
             if (track_row[ends] != NOTHING).all():
                 first, second = sorted(result.tracks.track_id[track_row[ends]].tolist())
-                if (first, second) in rows:
-                    self.watched.distance_m[result.frame.index, column] = near.distance_m[rows[first, second]]
+                if (row := rows.get((first, second))) is not None:
+                    self.watched.distance_m[result.frame.index, column] = near.distance_m[row]
+                    self.watched.sigma_m[result.frame.index, column] = near.sigma_m[row]
 
     def _rows_by_id(self, track_id: IntArray) -> IntArray:
         """Return (E,) the row of each entity under its own id, or -1."""
         row_of = np.full(len(self._clip.entity_id), NOTHING)
         row_of[np.searchsorted(self._clip.entity_id, track_id)] = np.arange(len(track_id))
-        return row_of
-
-    def _rows_by_overlap(self, frame: int, boxes_px: FloatArray, class_id: IntArray) -> IntArray:
-        """Return (E,) the row of the box that covers each visible entity, or -1."""
-        row_of = np.full(len(self._clip.entity_id), NOTHING)
-        visible = np.flatnonzero(np.isfinite(self._clip.box_px[frame]).all(axis=1))
-        similarity = overlaps(self._clip.box_px[frame, visible], boxes_px)
-        similarity *= _ROLE[self._clip.class_id[visible]][:, None] == _ROLE[class_id]
-        first, second = assign(similarity, MIN_OVERLAP)
-        row_of[visible[first]] = second
         return row_of
 
 

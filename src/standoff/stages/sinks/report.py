@@ -38,6 +38,8 @@ class ReportSink:
         warning_gap_m: Gap (distance less both action radii) below which the hazard stage warns, to be drawn;
             below 0 the circles touch, which is danger.
         at_close: Gives those descriptions anew that are only known after the last frame; None: nothing is.
+        checked: Gives after the last frame what the page says, in HTML, of how true the stated errors are, where truth
+            is known; None or an empty text: they were not checked, and the page says so.
     """
 
     def __init__(
@@ -48,7 +50,9 @@ class ReportSink:
         *,
         warning_gap_m: float = 1.0,
         at_close: Callable[[], Mapping[str, Any]] | None = None,
+        checked: Callable[[], str] | None = None,
     ) -> None:
+        self._checked = checked
         self._at_close = at_close
         self._path, self._warning_gap_m = Path(path), warning_gap_m
         self._descriptions = dict(descriptions or {})
@@ -65,11 +69,15 @@ class ReportSink:
         if self._at_close is not None:
             self._descriptions |= self._at_close()
         partial = partial_path(self._path)
-        partial.write_text(render(self._summary, outcome, self._descriptions, self._warning_gap_m), encoding="utf-8")
+        checked = "" if self._checked is None else self._checked()
+        page = render(self._summary, outcome, self._descriptions, self._warning_gap_m, checked)
+        partial.write_text(page, encoding="utf-8")
         partial.replace(self._path)
 
 
-def render(summary: RunSummary, outcome: Outcome, descriptions: Mapping[str, Any], warning_gap_m: float) -> str:
+def render(
+    summary: RunSummary, outcome: Outcome, descriptions: Mapping[str, Any], warning_gap_m: float, checked: str
+) -> str:
     """Return the page."""
     # matplotlib takes long to load; a run starts without it, and whoever imports another sink does not need it
     from standoff.stages.sinks.charts import clock, pair_charts, plan_chart, site_chart
@@ -102,6 +110,7 @@ def render(summary: RunSummary, outcome: Outcome, descriptions: Mapping[str, Any
         better=ground.get("better", ""),
         descriptions={heading: list(_flat(plain(value))) for heading, value in descriptions.items() if value},
         distance_text=distance_text,
+        checked=Markup(checked),
     )
 
 

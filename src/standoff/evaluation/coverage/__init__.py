@@ -1,0 +1,45 @@
+"""Whether the errors that runs state for their distances and positions are true, on clips with exact truth.
+
+from standoff.evaluation.coverage import evaluate_coverage
+
+for row in evaluate_coverage([(Path("run"), Path("clip"))]).pairs:
+    print(row.kind, row.band, row.score.made_m, row.coverage.inside_95)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from standoff.evaluation.coverage.samples import ClipSamples, PairSamples, PositionSamples, read_samples
+from standoff.evaluation.coverage.score import CoverageResult, PairRow, PositionRow, score_samples
+
+__all__ = [
+    "ClipSamples",
+    "CoverageResult",
+    "PairRow",
+    "PairSamples",
+    "PositionRow",
+    "PositionSamples",
+    "evaluate_coverage",
+    "read_samples",
+    "score_samples",
+]
+
+
+def evaluate_coverage(runs: Sequence[tuple[Path, Path]], on_run: Callable[[], None] | None = None) -> CoverageResult:
+    """Compare runs with the truth of their clips, pooled.
+
+    Args:
+        runs: Folder of each run and of its clip; one at least.
+        on_run: Called after each.
+
+    Raises:
+        DataError: A file is missing or not what it should be, or a run is not one of its clip.
+    """
+    samples = []
+    for run, clip in runs:
+        samples.append(read_samples(run, clip))
+        if on_run is not None:
+            on_run()
+    return score_samples(samples)
