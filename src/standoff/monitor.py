@@ -14,10 +14,12 @@ from pathlib import Path
 from typing import Any
 
 from standoff.clips import DETECTIONS_FILE
-from standoff.config import Settings, build_pipeline, build_replacement, resolved
+from standoff.config import Settings, build_pipeline, build_replacement, build_zones, resolved
 from standoff.core.errors import OutputError
 from standoff.core.types import FrameResult, Sink
+from standoff.core.zones import Zone
 from standoff.files.in_use import FolderInUse
+from standoff.files.zone_file import write_zones
 from standoff.pipeline import Pipeline
 from standoff.stages.detect import RecordedDetector
 from standoff.stages.frames import Source, open_source
@@ -33,9 +35,11 @@ from standoff.stages.sinks import (
     VideoSink,
     detections_table,
     prepare_output,
+    tracks_table,
 )
 
 RECORD = "run.json"
+ZONES = "zones.geojson"
 
 
 @dataclass
@@ -89,6 +93,9 @@ def open_run(source: Path | str, out: Path | str, settings: Settings, *, overwri
     _refuse_to_replace(Path(source).resolve(), Path(out).resolve(), "the source")
     if settings.detections is not None:
         _refuse_to_replace(settings.detections.resolve(), Path(out).resolve(), "the recorded detections")
+    if settings.zones is not None:
+        _refuse_to_replace(settings.zones.resolve(), Path(out).resolve(), "the zones")
+    zones = build_zones(settings)
     frames = open_source(
         source,
         start_s=settings.start_s,
@@ -118,7 +125,9 @@ def open_run(source: Path | str, out: Path | str, settings: Settings, *, overwri
     mark = FolderInUse(folder)
     # The record first, so that a folder without room is told before anything else is begun.
     record = RecordSink(folder / RECORD, descriptions, at_close)
-    own = build_sinks(settings, folder, descriptions, at_close)
+    if zones:
+        write_zones(folder / ZONES, zones)
+    own = build_sinks(settings, folder, descriptions, at_close, zones)
     # And closed last, so that it times all others.
     pipeline.sinks = {**own, **extra, "record": record}
     return Run(frames, pipeline, folder, record, mark)
@@ -154,6 +163,7 @@ def build_sinks(
     folder: Path,
     descriptions: dict[str, Any],
     at_close: Callable[[], Mapping[str, Any]] | None = None,
+    zones: tuple[Zone, ...] = (),
 ) -> dict[str, Sink]:
     """Make the configured outputs of standoff's own, without the record.
 
@@ -162,9 +172,10 @@ def build_sinks(
         folder: Where they go.
         descriptions: For the report.
         at_close: Gives descriptions anew once the last frame has been seen.
+        zones: What is drawn and listed of the site.
     """
     makers: dict[str, Any] = {
-        "tracks": lambda: TableSink(folder / "tracks.parquet", TRACKS, settings.tables),
+        "tracks": lambda: TableSink(folder / "tracks.parquet", tracks_table() if zones else TRACKS, settings.tables),
         "proximity": lambda: TableSink(folder / "proximity.parquet", PROXIMITY, settings.tables),
         "frames": lambda: TableSink(folder / "frames.parquet", FRAMES, settings.tables),
         "detections": lambda: TableSink(
@@ -173,13 +184,14 @@ def build_sinks(
             settings.tables,
         ),
         "hazards": lambda: HazardSink(folder / "hazards.jsonl"),
-        "video": lambda: VideoSink(folder / "annotated.mp4", settings.video),
+        "video": lambda: VideoSink(folder / "annotated.mp4", settings.video, zones),
         "report": lambda: ReportSink(
             folder / "report.html",
             settings.report,
             descriptions,
             warning_gap_m=settings.hazard.buffer_m,
             at_close=at_close,
+            zones=zones,
         ),
     }
     return {name: makers[name]() for name in settings.outputs}

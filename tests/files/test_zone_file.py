@@ -70,7 +70,8 @@ def test_heights_and_members_that_nobody_asked_for_are_passed_over(tmp_path: Pat
 
 
 def test_what_is_written_is_read_back_as_it_was(tmp_path: Path) -> None:
-    zones = read(tmp_path, collection(feature("a"), feature("b", "machine_only", "MultiPolygon", [[SQUARE, HOLE], [ISLE]])))
+    parts = [[SQUARE, HOLE], [ISLE]]
+    zones = read(tmp_path, collection(feature("a"), feature("b", "machine_only", "MultiPolygon", parts)))
     write_zones(tmp_path / "again.geojson", zones)
     again = read_zones(tmp_path / "again.geojson")
     assert [(zone.name, zone.kind) for zone in again] == [(zone.name, zone.kind) for zone in zones]
@@ -95,13 +96,13 @@ def test_degrees_become_metres_of_a_site_whose_place_on_the_earth_is_known(tmp_p
 
 def test_degrees_are_refused_where_nobody_said_where_the_site_is(tmp_path: Path) -> None:
     for members in ({}, {"crs": {"type": "name", "properties": {"name": "urn:ogc:def:crs:OGC:1.3:CRS84"}}}):
-        with pytest.raises(ConfigError, match="degrees of longitude and latitude in .*points with lonlat"):
+        with pytest.raises(ConfigError, match=r"degrees of longitude and latitude in .*points with lonlat"):
             read(tmp_path, collection(feature(coordinates=[degrees(SQUARE)]), **members))
 
 
 def test_latitude_before_longitude_is_refused(tmp_path: Path) -> None:
     swapped = [[y, x] for x, y in degrees(SQUARE)]
-    with pytest.raises(ConfigError, match="km away in .* Write longitude first"):
+    with pytest.raises(ConfigError, match=r"km away in .* Write longitude first"):
         read(tmp_path, collection(feature(coordinates=[swapped])), FRANKFURT)
 
 

@@ -17,9 +17,12 @@ ZONE_KINDS: tuple[ZoneKind, ...] = get_args(ZoneKind)
 ZONE_WORDS: dict[ZoneKind, str] = {
     "no_go": "no go",
     "machine_only": "machines only",
-    "crossing": "one kind at a time",
+    "crossing": "workers or machines",
 }
 """What a kind is called in pictures."""
+
+NOT_PLACED = "nobody stated where the site frame lies"
+"""Why zones cannot be found in a ground map."""
 
 Ring = FloatArray
 """(V, 2) corners in order, the first one not repeated; m, site frame."""
@@ -88,10 +91,10 @@ class Zone:
         return np.where(self.contains(points_m), -distance_m, distance_m), direction
 
 
-def ring_area_m2(ring_m: Ring) -> float:
-    """Return the area of a ring, positive where it goes counter-clockwise seen from above.
+def ring_area(ring_m: Ring) -> float:
+    """Return the area of a ring in its own unit, positive where it goes counter-clockwise seen from above.
 
-    >>> ring_area_m2(np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 3.0], [0.0, 3.0]]))
+    >>> ring_area(np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 3.0], [0.0, 3.0]]))
     6.0
     """
     # From its first corner: far from the origin the products would lose the area in their rounding.
@@ -99,9 +102,25 @@ def ring_area_m2(ring_m: Ring) -> float:
     return float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum() / 2.0)
 
 
+def ring_middle(ring: Ring) -> FloatArray:
+    """Return (2,) the centre of gravity of a ring's area, in its own unit; of one without an area the mean corner.
+
+    >>> ring_middle(np.array([[0.0, 0.0], [6.0, 0.0], [0.0, 3.0]]))
+    array([2., 1.])
+    """
+    from_first = ring - ring[0]
+    x, y = from_first.T
+    next_x, next_y = np.roll(x, -1), np.roll(y, -1)
+    twice = x * next_y - next_x * y
+    if not abs(twice.sum()) > 0:
+        return np.asarray(ring.mean(axis=0))
+    weighted = np.array([((x + next_x) * twice).sum(), ((y + next_y) * twice).sum()])
+    return np.asarray(ring[0] + weighted / (3.0 * twice.sum()))
+
+
 def _turned(ring_m: Ring, *, counter_clockwise: bool) -> Ring:
     ring = np.array(ring_m, dtype=np.float64).reshape(-1, 2)
-    if (ring_area_m2(ring) > 0) != counter_clockwise:
+    if (ring_area(ring) > 0) != counter_clockwise:
         ring = ring[::-1].copy()
     ring.setflags(write=False)
     return ring

@@ -8,7 +8,7 @@ import numpy as np
 
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.polygon import nearest_on, sides, within
-from standoff.core.zones import Ring, ring_area_m2
+from standoff.core.zones import Ring, ring_area
 
 _LEAST_AREA_M2 = 0.01
 _MOST_RINGS = 60
@@ -28,7 +28,7 @@ def faults_of(polygons_m: Sequence[Sequence[Ring]]) -> str:
     for ring in rings:
         if len(ring) > 2 and _meets_itself(ring):
             return "a ring that crosses or touches itself"
-        if len(ring) < 3 or abs(ring_area_m2(ring)) < _LEAST_AREA_M2:
+        if len(ring) < 3 or abs(ring_area(ring)) < _LEAST_AREA_M2:
             return "a ring without an area"
     if any(_cross(sides(one), sides(other)) for k, one in enumerate(rings) for other in rings[:k]):
         return "rings that cross each other"

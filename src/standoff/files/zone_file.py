@@ -74,7 +74,10 @@ def write_zones(path: Path, zones: tuple[Zone, ...]) -> None:
         {
             "type": "Feature",
             "properties": {"name": zone.name, "kind": zone.kind},
-            "geometry": {"type": "MultiPolygon", "coordinates": [[_closed(ring) for ring in p] for p in zone.polygons_m]},
+            "geometry": {
+                "type": "MultiPolygon",
+                "coordinates": [[*map(_closed, rings)] for rings in zone.polygons_m],
+            },
         }
         for zone in zones
     ]

@@ -10,6 +10,8 @@ from standoff.core.homography import FloatArray
 _LEAST_SIGMA_M = 1e-3
 """Nobody's place is known better; without it a place without error could not be divided by."""
 
+_FLAT_SIGMAS = 1e-9
+
 
 def probability_inside(outline_m: FloatArray, xy_m: FloatArray, covariance_m2: FloatArray) -> FloatArray:
     """Integrate the normal distributions of some places over an area.
@@ -42,10 +44,13 @@ def probability_inside(outline_m: FloatArray, xy_m: FloatArray, covariance_m2: F
 
 def _in_sigmas(outline_m: FloatArray, xy_m: FloatArray, covariance_m2: FloatArray) -> FloatArray:
     """Return (N, E, 2, 2) the outline around each place, stretched so that the place's distribution is round."""
-    root = np.linalg.cholesky(covariance_m2 + _LEAST_SIGMA_M**2 * np.eye(2))
+    # Where the place is told by hundreds of metres in one direction only, rounding may take the other below nothing.
+    wide = np.sqrt(np.maximum(covariance_m2[:, 0, 0], _LEAST_SIGMA_M**2))[:, None, None]
+    tilt = covariance_m2[:, 0, 1][:, None, None] / wide
+    narrow = np.sqrt(np.maximum(covariance_m2[:, 1, 1][:, None, None] - tilt**2, _LEAST_SIGMA_M**2))
     around = outline_m - xy_m[:, None, None]
-    x = around[..., 0] / root[:, None, None, 0, 0]
-    y = (around[..., 1] - root[:, None, None, 1, 0] * x) / root[:, None, None, 1, 1]
+    x = around[..., 0] / wide
+    y = (around[..., 1] - tilt * x) / narrow
     return np.stack([x, y], axis=-1)
 
 
@@ -55,8 +60,8 @@ def _shares(start: FloatArray, end: FloatArray) -> FloatArray:
     length = np.linalg.norm(along, axis=-1)
     unit = along / np.where(length > 0, length, 1.0)[..., None]
     height = start[..., 0] * unit[..., 1] - start[..., 1] * unit[..., 0]
-    # A triangle without height has nothing in it.
-    flat = (height == 0) | (length == 0)
+    # A triangle of hardly any height has hardly anything in it.
+    flat = np.abs(height) < _FLAT_SIGMAS
     off = np.where(flat, 1.0, np.abs(height))
     first, second = ((end_of * unit).sum(axis=-1) / off for end_of in (start, end))
     angles = (np.arctan(second) - np.arctan(first)) / (2.0 * np.pi)

@@ -1,19 +1,17 @@
-"""The hazard of one pair of tracks, from the first sign of it to its end."""
+"""The hazard of one pair of tracks, by the gap between them."""
 
 from __future__ import annotations
 
 import math
 
-from standoff.core.types import Hazard, Severity
-from standoff.stages.hazard.life import UNMEASURED, Latch, OpenHazard, Reading
+from standoff.core.types import Hazard
+from standoff.stages.hazard.life import Reading
 from standoff.stages.hazard.params import HazardParams
+from standoff.stages.hazard.watch import Limit, Watch
 
 
-class PairWatch:
-    """Watch one pair. In each frame call exactly one of `measure`, `miss` and `lose`.
-
-    Two latches follow the gap, one per limit: near (within the buffer) and breached (negative). A
-    hazard is open while the near latch is on; a pair that cannot be measured counts as near.
+class PairWatch(Watch):
+    """Watch one pair: near is a gap within the buffer, breached a negative one.
 
     Args:
         track_ids: Smaller id first.
@@ -21,97 +19,19 @@ class PairWatch:
     """
 
     def __init__(self, track_ids: tuple[int, int], params: HazardParams) -> None:
-        self._track_ids = track_ids
-        self._params = params
-        self._near = Latch(params.min_duration_s, params.release_s)
-        self._breached = Latch(params.min_duration_s, params.release_s)
-        self._missing_since_s: float | None = None
-        self._lost_since_s: float | None = None
-        self._reading = UNMEASURED
-        self._hazard: OpenHazard | None = None
-
-    @property
-    def is_open(self) -> bool:
-        """Whether a hazard is open."""
-        return self._hazard is not None
+        super().__init__("proximity", track_ids, params)
 
     def measurable(self, reading: Reading) -> bool:
         """Tell whether a reading says how near the pair is; NaN never does."""
         return not math.isnan(self._cautious_gap_m(reading))
 
-    def measure(self, time_s: float, reading: Reading) -> Hazard | None:
+    def measure_gap(self, time_s: float, reading: Reading) -> Hazard | None:
         """Take a measurement and return what there is to say of it."""
-        self._missing_since_s = self._lost_since_s = None
-        self._reading = reading
         gap_m = self._cautious_gap_m(reading)
-        for latch, limit_m in ((self._near, self._params.buffer_m), (self._breached, 0.0)):
-            latch.update(time_s, enters=gap_m < limit_m, leaves=gap_m > limit_m + self._params.hysteresis_m)
-        if not self._near.on:
-            return self.end(time_s, f"clear for {self._params.release_s:g} s")
-        severity = self._severity(gap_m)
-        if self._hazard is None:
-            return self._open(time_s, severity)
-        changed = severity != self._hazard.severity or not self._hazard.measured
-        if severity == "unknown" or not (changed or self._hazard.silent_s(time_s) >= self._params.update_every_s):
-            return None
-        self._hazard.severity = severity
-        return self._hazard.event("updated", time_s, reading)
+        return self.measure(time_s, reading, self._limit(gap_m, self._params.buffer_m), self._limit(gap_m, 0.0))
 
-    def miss(self, time_s: float, reason: str, *, may_open: bool) -> Hazard | None:
-        """Take that the pair is there but could not be measured.
-
-        Args:
-            time_s: Presentation timestamp.
-            reason: Why.
-            may_open: False while something else already says that nothing can be measured.
-        """
-        self._lost_since_s = None
-        self._reading = UNMEASURED
-        if self._missing_since_s is None:
-            self._missing_since_s = time_s
-        self._near.miss()
-        self._breached.miss()
-        patience_s = self._params.min_duration_s if self._near.stirred else self._params.unknown_after_s
-        if time_s - self._missing_since_s < patience_s:
-            return None
-        if self._hazard is not None:
-            return self._hazard.event("unknown", time_s, reason=reason) if self._hazard.measured else None
-        if not may_open:
-            return None
-        self._near.hold_on()
-        return self._open(time_s, "unknown", reason)
-
-    def lose(self, time_s: float, reason: str) -> Hazard | None:
-        """Take that the pair is no longer followed."""
-        if self._hazard is None:
-            return None
-        self._reading = UNMEASURED
-        self._near.miss()
-        self._breached.miss()
-        if self._lost_since_s is None:
-            self._lost_since_s = time_s
-            return self._hazard.event("unknown", time_s, reason=reason)
-        if time_s - self._lost_since_s < self._params.unknown_timeout_s:
-            return None
-        return self.end(time_s, f"{reason} for {self._params.unknown_timeout_s:g} s")
-
-    def end(self, time_s: float, reason: str) -> Hazard | None:
-        """Close the hazard, if one is open."""
-        if self._hazard is None:
-            return None
-        closing, self._hazard = self._hazard, None
-        return closing.event("closed", time_s, self._reading, reason)
-
-    def _open(self, time_s: float, severity: Severity, reason: str = "") -> Hazard:
-        self._hazard = OpenHazard("proximity", self._track_ids, severity)
-        return self._hazard.event("opened", time_s, self._reading, reason)
-
-    def _severity(self, gap_m: float) -> Severity:
-        """Return the level while the near latch is on; unknown if it was never measured near."""
-        if self._breached.on:
-            return "danger"
-        clear = gap_m > self._params.buffer_m + self._params.hysteresis_m
-        return "unknown" if clear and self._hazard is not None and self._hazard.severity == "unknown" else "warning"
+    def _limit(self, gap_m: float, limit_m: float) -> Limit:
+        return Limit(gap_m < limit_m, gap_m > limit_m + self._params.hysteresis_m)
 
     def _cautious_gap_m(self, reading: Reading) -> float:
         caution = self._params.caution_sigmas
