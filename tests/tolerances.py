@@ -198,3 +198,6 @@ CARRIED_SURVEY_PX = 1.5
 following a noisy picture by its keyframe adds some tenths."""
 FISHEYE_REL = 0.012
 """Lengths on the ground by a square of 100 px drawn 35 degrees off a fisheye's axis; measured: 0.005 at the worst."""
+
+TRIALS_SHARE = 0.01
+"""A share of 40 000 random trials: 0.0025 at the most, four of those."""

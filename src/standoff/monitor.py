@@ -14,10 +14,12 @@ from pathlib import Path
 from typing import Any
 
 from standoff.clips import DETECTIONS_FILE
-from standoff.config import Settings, build_pipeline, build_replacement, resolved
+from standoff.config import Settings, build_pipeline, build_replacement, build_zones, resolved
 from standoff.core.errors import OutputError
 from standoff.core.types import FrameResult, Sink
+from standoff.core.zones import Zone
 from standoff.files.in_use import FolderInUse
+from standoff.files.zone_file import write_zones
 from standoff.pipeline import Pipeline
 from standoff.stages.detect import RecordedDetector
 from standoff.stages.frames import Source, open_source
@@ -33,9 +35,11 @@ from standoff.stages.sinks import (
     VideoSink,
     detections_table,
     prepare_output,
+    tracks_table,
 )
 
 RECORD = "run.json"
+ZONES = "zones.geojson"
 
 
 @dataclass
@@ -97,6 +101,9 @@ def open_run(
     _refuse_to_replace(Path(source).resolve(), Path(out).resolve(), "the source")
     if settings.detections is not None:
         _refuse_to_replace(settings.detections.resolve(), Path(out).resolve(), "the recorded detections")
+    if settings.zones is not None:
+        _refuse_to_replace(settings.zones.resolve(), Path(out).resolve(), "the zones")
+    zones = build_zones(settings)
     frames = open_source(
         source,
         start_s=settings.start_s,
@@ -126,7 +133,9 @@ def open_run(
     mark = FolderInUse(folder)
     # The record first, so that a folder without room is told before anything else is begun.
     record = RecordSink(folder / RECORD, descriptions, at_close)
-    own = build_sinks(settings, folder, descriptions, at_close, checked)
+    if zones:
+        write_zones(folder / ZONES, zones)
+    own = build_sinks(settings, folder, descriptions, at_close, checked, zones)
     # And closed last, so that it times all others.
     pipeline.sinks = {**own, **extra, "record": record}
     return Run(frames, pipeline, folder, record, mark)
@@ -163,6 +172,7 @@ def build_sinks(
     descriptions: dict[str, Any],
     at_close: Callable[[], Mapping[str, Any]] | None = None,
     checked: Callable[[], str] | None = None,
+    zones: tuple[Zone, ...] = (),
 ) -> dict[str, Sink]:
     """Make the configured outputs of standoff's own, without the record.
 
@@ -172,9 +182,10 @@ def build_sinks(
         descriptions: For the report.
         at_close: Gives descriptions anew once the last frame has been seen.
         checked: Gives then what the report says of how true the stated errors are, where truth is known.
+        zones: What is drawn and listed of the site.
     """
     makers: dict[str, Any] = {
-        "tracks": lambda: TableSink(folder / "tracks.parquet", TRACKS, settings.tables),
+        "tracks": lambda: TableSink(folder / "tracks.parquet", tracks_table() if zones else TRACKS, settings.tables),
         "proximity": lambda: TableSink(folder / "proximity.parquet", PROXIMITY, settings.tables),
         "frames": lambda: TableSink(folder / "frames.parquet", FRAMES, settings.tables),
         "detections": lambda: TableSink(
@@ -183,7 +194,7 @@ def build_sinks(
             settings.tables,
         ),
         "hazards": lambda: HazardSink(folder / "hazards.jsonl"),
-        "video": lambda: VideoSink(folder / "annotated.mp4", settings.video),
+        "video": lambda: VideoSink(folder / "annotated.mp4", settings.video, zones),
         "report": lambda: ReportSink(
             folder / "report.html",
             settings.report,
@@ -191,6 +202,7 @@ def build_sinks(
             warning_gap_m=settings.hazard.buffer_m,
             at_close=at_close,
             checked=checked,
+            zones=zones,
         ),
     }
     return {name: makers[name]() for name in settings.outputs}

@@ -146,6 +146,9 @@ def run(
     telemetry: Annotated[
         str | None, typer.Option(help="The drone's log (.srt), or none. Default: the log beside the film.")
     ] = None,
+    zones: Annotated[
+        str | None, typer.Option(help="GeoJSON file of zones in the site frame, and who must not be in them.")
+    ] = None,
     start: Annotated[float | None, typer.Option(help="Begin here; s.")] = None,
     stop: Annotated[float | None, typer.Option(help="End here; s.")] = None,
     every: Annotated[int | None, typer.Option(help="Read every k-th frame only.")] = None,
@@ -167,6 +170,7 @@ def run(
 
     plain = {
         "telemetry": telemetry,
+        "zones": zones,
         "start_s": start,
         "stop_s": stop,
         "every": every,
@@ -252,6 +256,10 @@ def tell(ended: Run, *, as_json: bool, quiet: bool) -> None:
             ("tracks", f"{counts['tracks']}"),
             ("distances measured", f"{counts['measured_distances']} of {counts['distances']}"),
             ("hazards", ", ".join(f"{number} {name}" for name, number in hazards.items()) or "none"),
+            *(
+                (f"in {zone}", ", ".join(f"{number} {name}" for name, number in found.items()))
+                for zone, found in counts.get("zones", {}).items()
+            ),
             ("frames a second", f"{record['frames_per_s']}"),
         ]
         rows += [(f"no map: {reason}", f"{number}") for reason, number in counts["no_ground_map"].items()]

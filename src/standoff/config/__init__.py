@@ -10,6 +10,7 @@ from standoff.config.build import (
     build_pipeline,
     build_replacement,
     build_stage,
+    build_zones,
     import_factory,
 )
 from standoff.config.load import load_settings, read_settings_file, resolved
@@ -37,6 +38,7 @@ __all__ = [
     "build_pipeline",
     "build_replacement",
     "build_stage",
+    "build_zones",
     "import_factory",
     "load_settings",
     "read_params",

@@ -11,6 +11,8 @@ from standoff.core.camera import Camera, CameraPrior
 from standoff.core.errors import ConfigError
 from standoff.core.protocols import CameraMotionEstimator, Detector, Ground
 from standoff.core.types import Frame
+from standoff.core.zones import Zone
+from standoff.files.zone_file import read_zones
 from standoff.pipeline import Pipeline
 from standoff.stages.detect import OnnxDetector, RecordedDetector, find_model
 from standoff.stages.ground import (
@@ -147,6 +149,22 @@ def build_ground(settings: Settings, known: CameraPrior | None = None) -> Ground
     return ScaleWatch(fused, prior)
 
 
+def build_zones(settings: Settings) -> tuple[Zone, ...]:
+    """Read the configured zones; those in degrees are placed by the survey.
+
+    Raises:
+        ConfigError: They cannot be used, or nobody would watch them.
+        GroundError: The survey cannot be used.
+    """
+    if settings.zones is None:
+        return ()
+    if "hazard" in settings.replace:
+        raise _unread("zones", "a hazard stage of your own")
+    survey = settings.ground.survey
+    own_ground = "ground" in settings.replace
+    return read_zones(settings.zones, None if survey is None or own_ground else load_survey(survey).origin)
+
+
 def _unread(what: str, beside: str) -> ConfigError:
     # Silence about a marker that nobody reads would pass for a site without one.
     return ConfigError(
@@ -172,7 +190,7 @@ _MAKERS: Mapping[StageName, Callable[[Settings], Any]] = {
     "track": lambda settings: Tracker(settings.track),
     "locate": lambda settings: Locator(settings.locate),
     "proximity": lambda settings: ProximityMeter(settings.proximity),
-    "hazard": lambda settings: HazardMonitor(settings.hazard),
+    "hazard": lambda settings: HazardMonitor(settings.hazard, build_zones(settings)),
 }
 
 

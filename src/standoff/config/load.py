@@ -64,6 +64,7 @@ def _anchor_paths(settings: dict[str, Any], folder: Path) -> None:
         (settings, "model"),
         (settings, "detections"),
         (settings, "telemetry"),
+        (settings, "zones"),
         (ground, "survey"),
         (ground, "camera"),
     )

@@ -209,6 +209,10 @@ class Settings(BaseSettings):
     ground: Annotated[GroundSettings, Field(description="The ground map.")] = GroundSettings()
     track: Annotated[TrackParams, Field(description="The tracker.")] = TrackParams()
     locate: Annotated[LocateParams, Field(description="From boxes to places on the ground.")] = LocateParams()
+    zones: Annotated[
+        Path | None,
+        Field(description="GeoJSON file of zones in the site frame, and who must not be in them. Absent: none."),
+    ] = None
     proximity: Annotated[ProximityParams, Field(description="Distances of pairs.")] = ProximityParams()
     hazard: Annotated[HazardParams, Field(description="From distances to warnings.")] = HazardParams()
     outputs: Annotated[tuple[OutputName, ...], Field(description="What is written beside run.json.")] = OUTPUT_NAMES

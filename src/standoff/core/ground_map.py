@@ -45,6 +45,8 @@ class GroundMap:
         age_s: Seconds since it was last observed; 0 when observed in this frame.
         site_frame: Counts the stream's site frames up: where something better begins to tell the ground, places may be
             counted from elsewhere, and those of different frames cannot be compared.
+        frame_stated: Whether somebody stated where the site frame lies (surveyed points, markers, a reference whose
+            first corner is told), so that places of a plan can be found in it.
     """
 
     image_to_ground: FloatArray
@@ -57,6 +59,7 @@ class GroundMap:
     camera: Camera | None = None
     age_s: float = 0.0
     site_frame: int = 0
+    frame_stated: bool = False
 
     def __post_init__(self) -> None:
         covariance = np.zeros((10, 10))

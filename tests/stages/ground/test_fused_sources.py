@@ -105,6 +105,7 @@ def test_a_marker_gives_metres_within_its_stated_errors(
     view = looking(heading_deg, pitch_deg, distance_m)
     result = mapped(by_marker().update(frame(pictured(view)), NOTHING, STILL))
     assert result.method == "markers"
+    assert result.frame_stated
     assert error_in_sigmas(result, view).max() < 4.0
     corners_m, _ = result.to_ground(view.project(PLACE.corners_m))
     assert np.abs(corners_m - PLACE.corners_m[:, :2]).max() < 0.05
@@ -119,6 +120,7 @@ def test_telemetry_alone_gives_metres_within_its_stated_errors() -> None:
             FusedGround(camera=CameraPrior.calibrated(CAMERA)).update(frame(BARE, 0.0, said), NOTHING, STILL)
         )
         off.append(np.median(error_in_sigmas(result, view)))
+        assert not result.frame_stated
     assert np.mean(np.array(off) < 2.0) > 0.9
 
 
@@ -211,6 +213,7 @@ def test_people_alone_give_a_map_or_a_reason_never_silence() -> None:
         assert all(result or reason(result) for result in results)
         if isinstance(results[-1], GroundMap):
             assert results[-1].method == "sizes"
+            assert not results[-1].frame_stated
             pixels = np.array([[600.0, 400.0], [680.0, 400.0]])
             ratio = np.linalg.norm(np.diff(results[-1].to_ground(pixels)[0], axis=0)) / np.linalg.norm(
                 np.diff(crowd.view.to_plane(pixels), axis=0)

@@ -107,8 +107,8 @@ def test_a_survey_takes_over_the_frame_of_a_reference_without_a_place() -> None:
         result = ground.update(frame(picture(k), k / FPS), boxes(k), motion(k))
         error, sigma = error_and_sigma(result, k)
         assert error < 3.0 * sigma
-        frames.append(seen(result).site_frame)
-    assert frames == [0, 0, 1, 1, 1]
+        frames.append((seen(result).site_frame, seen(result).frame_stated))
+    assert frames == [(0, False)] * 2 + [(1, True)] * 3
     assert place_error_m(result, 4) < 0.25
 
 

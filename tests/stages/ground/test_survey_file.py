@@ -15,7 +15,7 @@ from mutations import mutated
 from stages.ground.test_surveyed import LENS, updated
 
 from standoff.core.errors import GroundError
-from standoff.stages.ground.geographic import east_north_m
+from standoff.core.geographic import east_north_m
 from standoff.stages.ground.survey_file import load_survey
 
 _SURVEY = """

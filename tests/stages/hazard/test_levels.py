@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from standoff.stages.hazard.levels import levels_of
 from standoff.stages.hazard.life import UNMEASURED, Reading
 from standoff.stages.hazard.params import HazardParams
+from standoff.stages.hazard.watch import Limit
 
 PROBABLE = HazardParams(warning_probability=0.4, danger_probability=0.6)
 DISTANT = HazardParams(rule="distance")
@@ -24,8 +25,8 @@ def reading(gap_m: float, now: float = math.nan, ahead: float = math.nan) -> Rea
 def test_probabilities_decide_whatever_the_gap(now: float, ahead: float, gap_m: float) -> None:
     levels = levels_of(reading(gap_m, now, ahead), PROBABLE)
     assert levels is not None
-    assert levels.near == (ahead >= 0.4, ahead < 0.2)
-    assert levels.breached == (now >= 0.6, now < 0.3)
+    assert levels.near == Limit(ahead >= 0.4, ahead < 0.2)
+    assert levels.breached == Limit(now >= 0.6, now < 0.3)
 
 
 @given(gap_m=st.floats(-7, 50), now=st.floats(0, 1), ahead=st.floats(0, 1))
@@ -34,8 +35,8 @@ def test_by_distance_probabilities_say_nothing_and_without_them_the_distance_doe
 ) -> None:
     by_distance = levels_of(reading(gap_m, now, ahead), DISTANT)
     assert by_distance is not None and by_distance == levels_of(reading(gap_m), PROBABLE)
-    assert by_distance.near == (gap_m < 1.0, gap_m > 1.5)
-    assert by_distance.breached == (gap_m < 0.0, gap_m > 0.5)
+    assert by_distance.near == Limit(gap_m < 1.0, gap_m > 1.5)
+    assert by_distance.breached == Limit(gap_m < 0.0, gap_m > 0.5)
 
 
 @pytest.mark.parametrize("params", [PROBABLE, DISTANT])
@@ -53,4 +54,4 @@ def test_a_probability_that_is_none_is_refused(name: str, value: float) -> None:
 @pytest.mark.parametrize("params", [PROBABLE, DISTANT])
 def test_an_excused_pair_is_clear_however_near(params: HazardParams) -> None:
     levels = levels_of(Reading(1.0, -6.8, 0.2, 1.0, 1.0, "the machine is parked"), params)
-    assert levels == ((False, True), (False, True))
+    assert levels == (Limit(False, True), Limit(False, True))

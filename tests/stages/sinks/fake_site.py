@@ -112,6 +112,7 @@ class FakeSite:
             anchors_px=anchors if self.camera is None else self.camera.distort(anchors),
             camera=self.camera,
             age_s=age_s,
+            frame_stated=True,
         )
 
     def xy_m(self, time_s: float) -> FloatArray:

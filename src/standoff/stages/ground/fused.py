@@ -14,7 +14,7 @@ from standoff.core.homography import FloatArray
 from standoff.core.pose import CHANGES
 from standoff.core.types import CameraMotion, Detections, Frame, GroundMap, NoCameraMotion, NoGroundMap
 from standoff.stages.ground.basis import HELP, BasisTally
-from standoff.stages.ground.camera_belief import CameraBelief, Moment
+from standoff.stages.ground.camera_belief import STATED, CameraBelief, Moment
 from standoff.stages.ground.last_resorts import LastResorts
 from standoff.stages.ground.marker_observer import MarkerObserver
 from standoff.stages.ground.params import FusedParams
@@ -237,6 +237,7 @@ class FusedGround:
             size_sigma=size_sigma,
             middle_m=middle_m,
             site_frame=belief.site_frame,
+            frame_stated=belief.frame_of == STATED and self._references.corners_told,
         )
 
     def _measured_by(self, keeper: SolidObserver | None) -> tuple[float, FloatArray | None]:

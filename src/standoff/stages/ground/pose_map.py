@@ -22,6 +22,7 @@ def map_from_view(
     size_sigma: float = 0.0,
     middle_m: FloatArray | None = None,
     site_frame: int = 0,
+    frame_stated: bool = False,
 ) -> GroundMap:
     """Return the map of the ground, z = 0.
 
@@ -35,6 +36,7 @@ def map_from_view(
         size_sigma: Standard error of all lengths at once, as a share of them: of the tape measure.
         middle_m: (2,) the place that such an error leaves where it is; None: the origin.
         site_frame: Which of the stream's site frames the metres are of.
+        frame_stated: Whether somebody stated where that lies.
     """
     matrix, by_view = _entries_with_jacobian(view.plane_to_pinhole(), view.site_to_camera, view.camera.matrix)
     total = by_view @ covariance @ by_view.T
@@ -54,6 +56,7 @@ def map_from_view(
         camera=view.camera,
         age_s=age_s,
         site_frame=site_frame,
+        frame_stated=frame_stated,
     )
 
 

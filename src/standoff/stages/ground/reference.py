@@ -78,6 +78,7 @@ class ReferenceGround:
         self._hint = self._given.first_corner_px
         self._known_s = -np.inf
         self._outlined = False
+        self._corners_told = len(shape.turns_onto_itself()) == 1 or self._hint is not None
 
     @property
     def description(self) -> dict[str, Any]:
@@ -214,6 +215,7 @@ class ReferenceGround:
         same = [(best + turn) % 4 for turn in self._shape.turns_onto_itself()]
         if plausible.sum() > plausible[same].sum():
             return NoGroundMap(AMBIGUOUS)
+        self._corners_told &= len(same) == 1
         if self._corners is not None:
             stale = turn_from_before(corners_px, self._corners)
             return stale if stale in same else best
@@ -240,6 +242,7 @@ class ReferenceGround:
             scale_m_per_px=rectified_scale_m_per_px(corners_px, self._shape),
             anchors_px=corners_px if self._camera is None else self._camera.distort(corners_px),
             camera=self._camera,
+            frame_stated=self._corners_told,
         )
 
     def _accept(self, outline: Quadrilateral, turn: int, frame: Frame, gray: ImageArray) -> GroundMap:

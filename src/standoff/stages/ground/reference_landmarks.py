@@ -69,6 +69,11 @@ class ReferenceLandmarks:
         unseen = [solid for solid in self._solids if not solid.was_seen and solid.name in self._why_unseen]
         return [f"{solid.name} was found in no frame: {self._why_unseen[solid.name]}" for solid in unseen]
 
+    @property
+    def corners_told(self) -> bool:
+        """Whether of every reference with a stated place it is certain which corner is which."""
+        return all(solid.corners_told for solid in self._solids if solid.reference.place_known)
+
     def forget_places(self) -> None:
         """Forget where references without a stated place stand: the site frame is another one now."""
         for solid in self._solids:
@@ -91,7 +96,7 @@ class ReferenceLandmarks:
         now = belief.now if moment.held else None
         if now is not None:
             for solid in self._solids:
-                solid.carry(now, keeps_height=_keeps_height(solid, belief))
+                solid.carry(now, moment.frame.time_s, keeps_height=_keeps_height(solid, belief))
         lost = [solid for solid in self._solids if not solid.located]
         if len(lost) > 1 and not (belief.by_landmark and moment.held):
             reason = sort_out(lost, moment.gray, moment.detections, belief.lens)
@@ -130,7 +135,7 @@ class ReferenceLandmarks:
             if found.reason == NOT_THERE:
                 self._doubt_lens(moment, belief, solid)
             return found.reason
-        own = solid.belief(found)
+        own = solid.belief(found, time_s)
         doubt = doubt_between(own, found.alternatives, solid.reference.shape)
         outranks = solid.reference.place_known and belief.frame_of not in ("", STATED)
         if not held or outranks:
@@ -172,7 +177,7 @@ class ReferenceLandmarks:
             self.forget_places()
         belief.begin("reference", own, moment, frame_of=frame_of, keeper=solid.name, height_known=known, doubt=doubt)
         solid.defines_frame()
-        moment.anchors_px.append(solid.note(own.state))
+        moment.anchors_px.append(solid.note(own.state, moment.frame.time_s))
         return ""
 
     def _still_doubts(self, time_s: float) -> bool:
@@ -197,7 +202,7 @@ def _take(solid: SolidObserver, seen: tuple[SolidState, FloatArray], moment: Mom
     belief.correct(*seen, solid.name, moment)
     now = belief.now
     assert now is not None
-    moment.anchors_px.append(solid.note_seen(now, keeps_height=_keeps_height(solid, belief)))
+    moment.anchors_px.append(solid.note_seen(now, moment.frame.time_s, keeps_height=_keeps_height(solid, belief)))
 
 
 def _join(solid: SolidObserver, own: Belief, moment: Moment, belief: CameraBelief) -> str:

@@ -90,6 +90,8 @@ class SolidObserver:
         height: What is known of its height.
         placement: Where it stands on the site; None: not known yet.
         stands_still: Whether that is certain; if not, it was learned through the belief about the camera.
+        corners_told: Whether it is certain which corner is which: the shape tells, or the operator did and it was
+            followed since.
 
     Args:
         reference: Which.
@@ -110,10 +112,16 @@ class SolidObserver:
         self.stands_still = known
         given_m = self.reference.height_m
         self.height = HeightPrior.unknown() if given_m is None else HeightPrior.known(given_m)
+        self.corners_told = not self._looks_the_same_turned or self.reference.place.first_corner_px is not None
         self._last: SolidState | None = None
+        self._last_s = -np.inf
         self._box: FloatArray | None = None
         self._refused_since_s: float | None = None
         self._searched: tuple[float, NoGroundMap] | None = None
+
+    @property
+    def _looks_the_same_turned(self) -> bool:
+        return len(self.reference.shape.turns_onto_itself()) > 1
 
     @property
     def box(self) -> FloatArray | None:
@@ -130,10 +138,13 @@ class SolidObserver:
         """Whether it has been seen, or the operator said where it is."""
         return self._box is not None or self.reference.place.box_xyxy_px is not None
 
-    def carry(self, now: Estimate, *, keeps_height: bool) -> None:
-        """Take along where it is in the picture."""
+    def carry(self, now: Estimate, time_s: float, *, keeps_height: bool) -> None:
+        """Take along where it is in the picture, and how it is turned."""
         if self._box is not None and self.placement is not None:
-            self._note_outline(self._state(now, self.placement, keeps_height=keeps_height))
+            own = self._state(now, self.placement, keeps_height=keeps_height)
+            if self._last is not None:
+                self._last, self._last_s = own, time_s
+            self._note_outline(own)
 
     def look(
         self,
@@ -253,8 +264,17 @@ class SolidObserver:
         around = np.concatenate([corners_px.min(axis=0), corners_px.max(axis=0)])
         return _covered(box, around) >= _LEAST_FILLED
 
-    def belief(self, found: Found) -> Belief:
-        """Return what was found, as a belief in its own frame, with the corners named as before."""
+    def belief(self, found: Found, time_s: float) -> Belief:
+        """Return what was found, as a belief in its own frame, with the corners named as before.
+
+        Args:
+            found: By a search.
+            time_s: Of the frame.
+        """
+        forgotten = self._last is not None and time_s - self._last_s > self.reference.params.memory_s
+        if forgotten and self._looks_the_same_turned:
+            # The camera may have turned since.
+            self.corners_told = False
         hint_px = self.reference.place.first_corner_px if self._last is None else None
         return turned_like(found.belief(), self.reference.shape, last=self._last, corner_px=hint_px)
 
@@ -271,16 +291,16 @@ class SolidObserver:
         self.placement = Placement.identity() if self.reference.place_known else None
         self.stands_still = self.reference.place_known
 
-    def note(self, own: SolidState) -> FloatArray:
+    def note(self, own: SolidState, time_s: float) -> FloatArray:
         """Take note of where it was seen (its own frame); return (N, 2) the upper corners, none where out of sight."""
-        self._last = own
+        self._last, self._last_s = own, time_s
         self._refused_since_s = None
         return self._note_outline(own)
 
-    def note_seen(self, now: Estimate, *, keeps_height: bool) -> FloatArray:
+    def note_seen(self, now: Estimate, time_s: float, *, keeps_height: bool) -> FloatArray:
         """Take note that it was seen where it is believed to be; return as `note`."""
         assert self.placement is not None, "it was seen"
-        return self.note(self._state(now, self.placement, keeps_height=keeps_height))
+        return self.note(self._state(now, self.placement, keeps_height=keeps_height), time_s)
 
     def is_in(self, box_xyxy_px: FloatArray) -> None:
         """Take note of the box (4,) that shows it."""

@@ -27,9 +27,9 @@ import numpy as np
 
 from standoff.core.camera import Camera
 from standoff.core.errors import GroundError
+from standoff.core.geographic import GeographicOrigin, look_like_degrees
 from standoff.core.homography import FloatArray
 from standoff.stages.ground.camera_file import load_camera
-from standoff.stages.ground.geographic import east_north_m, look_like_degrees
 from standoff.stages.ground.surveyed import SurveyedGround
 from standoff.stages.ground.yaml_file import check_keys, numbers, read_mapping
 
@@ -51,6 +51,7 @@ def load_survey(path: Path | str, *, camera: Camera | None = None) -> SurveyedGr
     content = read_mapping(path, _WHAT)
     check_keys(content, _KEYS, str(path))
     points = _points(content, path)
+    points_m, origin = _points_m(points, path)
     if camera is None and content.get("camera") is not None:
         camera = load_camera(path.parent / str(content["camera"]))
     if "image_size_px" not in content:
@@ -64,13 +65,14 @@ def load_survey(path: Path | str, *, camera: Camera | None = None) -> SurveyedGr
     sigma_px = numbers(content.get("point_sigma_px", 1.0), (), f"point_sigma_px in {path}")
     ground = SurveyedGround(
         [numbers(point.get("px"), (2,), f"px of {name!r} in {path}") for name, point in points.items()],
-        _points_m(points, path),
+        points_m,
         (int(width_px), int(height_px)),
         names=tuple(points),
         camera=camera,
         area_px=area_px,
         point_sigma_px=float(sigma_px),
         time_s=None if time_s is None else float(numbers(time_s, (), f"time_s in {path}")),
+        origin=origin,
     )
     if ground.is_mirrored and any("lonlat" in point for point in points.values()):
         raise GroundError(
@@ -80,7 +82,8 @@ def load_survey(path: Path | str, *, camera: Camera | None = None) -> SurveyedGr
     return ground
 
 
-def _points_m(points: Mapping[str, Mapping[str, Any]], path: Path) -> FloatArray:
+def _points_m(points: Mapping[str, Mapping[str, Any]], path: Path) -> tuple[FloatArray, GeographicOrigin | None]:
+    """Return (N, 2) the points' places, and where on the earth their frame begins if they are told in degrees."""
     units = {unit for point in points.values() for unit in ("m", "lonlat") if unit in point}
     if len(units) > 1:
         fix = "write all points in one of them"
@@ -93,7 +96,10 @@ def _points_m(points: Mapping[str, Mapping[str, Any]], path: Path) -> FloatArray
         if outside.any():
             found = f"{places[outside][0].tolist()} in {path}"
             raise GroundError(expected="degrees [longitude, latitude]", found=found, fix="correct lonlat")
-        return east_north_m(places) if len(places) else places
+        if not len(places):
+            return places, None
+        origin = GeographicOrigin.of(places)
+        return origin.to_metres(places), origin
     if len(places) > 1 and look_like_degrees(places):
         span_m = np.ptp(places, axis=0).max()
         raise GroundError(
@@ -101,7 +107,7 @@ def _points_m(points: Mapping[str, Mapping[str, Any]], path: Path) -> FloatArray
             found=f"points that all lie within {span_m:.2g} m in {path}, probably degrees of longitude and latitude",
             fix="write lonlat: [longitude, latitude] in place of m",
         )
-    return places
+    return places, None
 
 
 def _points(content: Mapping[str, Any], path: Path) -> dict[str, Mapping[str, Any]]:

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from standoff.core import homography
 from standoff.core.camera import Camera
 from standoff.core.errors import GroundError
+from standoff.core.geographic import GeographicOrigin
 from standoff.core.homography import FloatArray
 from standoff.core.types import CameraMotion, Detections, Frame, GroundMap, NoCameraMotion, NoGroundMap
 from standoff.stages.ground.survey_fit import SurveyFit, fit_survey
@@ -42,10 +43,12 @@ class SurveyedGround:
         point_sigma_px: How well a point was read, one coordinate; the survey's own error belongs in it too.
         time_s: When the picture was taken that the points were read from, where the camera does not stay as it was
             then; None: any time.
+        origin: Where on the earth the positions are counted from; None: nobody said.
 
     Attributes:
         points_m: (N, 2) as given.
         time_s: As given.
+        origin: As given.
         fit: Residuals and covariance.
         description: For the record; JSON types only.
 
@@ -64,6 +67,7 @@ class SurveyedGround:
         area_px: npt.ArrayLike = (),
         point_sigma_px: float = 1.0,
         time_s: float | None = None,
+        origin: GeographicOrigin | None = None,
     ) -> None:
         seen_px, surveyed_m = _pairs(points_px, points_m)
         names = tuple(names) or tuple(f"point {number}" for number in range(1, len(seen_px) + 1))
@@ -76,7 +80,7 @@ class SurveyedGround:
         _check_inside(seen_px, image_size_px, names)
         camera = None if camera is None else _fitting_camera(camera, image_size_px)
         ideal_px = _undistorted(seen_px, camera, names)
-        self.points_m, self.time_s = surveyed_m, time_s
+        self.points_m, self.time_s, self.origin = surveyed_m, time_s, origin
         self.fit = fit_survey(ideal_px, surveyed_m, names, point_sigma_px)
         self._surveyed = GroundMap(
             image_to_ground=self.fit.image_to_ground,
@@ -87,6 +91,7 @@ class SurveyedGround:
             valid_px=_area(area_px, camera),
             anchors_px=seen_px,
             camera=camera,
+            frame_stated=True,
         )
         self._current: GroundMap | NoGroundMap = self._surveyed
         self._current_size_px = image_size_px

@@ -7,21 +7,10 @@ from typing import NamedTuple
 
 from standoff.stages.hazard.life import Reading
 from standoff.stages.hazard.params import HazardParams
+from standoff.stages.hazard.watch import Limit
 
 _RELEASE = 0.5
 """A level that a probability began ends at this share of it."""
-
-
-class Level(NamedTuple):
-    """What a reading says of one level.
-
-    Attributes:
-        enters: It holds.
-        leaves: It surely does not; neither is between the two limits of a hysteresis.
-    """
-
-    enters: bool
-    leaves: bool
 
 
 class Levels(NamedTuple):
@@ -32,8 +21,8 @@ class Levels(NamedTuple):
         breached: Danger.
     """
 
-    near: Level
-    breached: Level
+    near: Limit
+    breached: Limit
 
 
 def levels_of(reading: Reading, params: HazardParams) -> Levels | None:
@@ -47,14 +36,14 @@ def levels_of(reading: Reading, params: HazardParams) -> Levels | None:
     if math.isnan(gap_m):
         return None
     if reading.excuse:
-        return Levels(Level(False, True), Level(False, True))
+        return Levels(Limit(False, True), Limit(False, True))
     if params.rule == "probability" and not math.isnan(reading.breach_ahead):
         return Levels(
             _above(reading.breach_ahead, params.warning_probability),
             _above(reading.breach_now, params.danger_probability),
         )
-    return Levels(*(Level(gap_m < limit, gap_m > limit + params.hysteresis_m) for limit in (params.buffer_m, 0.0)))
+    return Levels(*(Limit(gap_m < limit, gap_m > limit + params.hysteresis_m) for limit in (params.buffer_m, 0.0)))
 
 
-def _above(probability: float, limit: float) -> Level:
-    return Level(probability >= limit, probability < _RELEASE * limit)
+def _above(probability: float, limit: float) -> Limit:
+    return Limit(probability >= limit, probability < _RELEASE * limit)

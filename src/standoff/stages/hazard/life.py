@@ -9,10 +9,14 @@ from ulid import ULID
 
 from standoff.core.types import Hazard, Phase, Severity
 
+NOT_MEASURED = "not measured"
+TRACK_LOST = "track lost"
+NOT_WATCHED = "pair not watched any more"
+
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """One measurement of a pair: why it is no hazard, if so, and numbers, NaN where there are none."""
+    """One measurement of a pair, or of an entity and a zone: numbers, NaN where there are none, and an excuse."""
 
     distance_m: float
     gap_m: float
@@ -88,17 +92,19 @@ class OpenHazard:
     """A hazard from its first event to its last, under one id.
 
     Args:
-        rule: "proximity" or "measurement".
-        track_ids: The pair, smaller id first; empty for rule "measurement".
+        rule: "proximity", "zone" or "measurement".
+        track_ids: Smaller id first; empty where it is of the whole stream.
         severity: To begin with.
+        zone: Name of the zone; empty where it is of none.
     """
 
-    __slots__ = ("_hazard_id", "_rule", "_said_s", "_track_ids", "measured", "reason", "severity")
+    __slots__ = ("_hazard_id", "_rule", "_said_s", "_track_ids", "_zone", "measured", "reason", "severity")
 
-    def __init__(self, rule: str, track_ids: tuple[int, ...], severity: Severity) -> None:
+    def __init__(self, rule: str, track_ids: tuple[int, ...], severity: Severity, zone: str = "") -> None:
         self._hazard_id = str(ULID())
         self._rule = rule
         self._track_ids = track_ids
+        self._zone = zone
         self._said_s = -math.inf
         self.severity = severity
         self.measured = False
@@ -122,6 +128,7 @@ class OpenHazard:
             reason=reason,
             breach_now=reading.breach_now,
             breach_ahead=reading.breach_ahead,
+            zone=self._zone,
         )
 
     def silent_s(self, time_s: float) -> float:
@@ -130,14 +137,19 @@ class OpenHazard:
 
 
 class StreamHazard:
-    """The hazard of a stream as a whole, if one is open: what tells of no pair but of all that is measured."""
+    """The hazard of a stream as a whole, if one is open: what tells of no pair but of all that is measured.
 
-    def __init__(self) -> None:
+    Args:
+        rule: Whose it is.
+    """
+
+    def __init__(self, rule: str = "measurement") -> None:
+        self._rule = rule
         self._hazard: OpenHazard | None = None
 
     def begin(self, time_s: float, reason: str) -> Hazard:
         """Open the hazard."""
-        self._hazard = OpenHazard("measurement", (), "unknown")
+        self._hazard = OpenHazard(self._rule, (), "unknown")
         return self._hazard.event("opened", time_s, reason=reason)
 
     def end(self, time_s: float, reason: str) -> Hazard | None:

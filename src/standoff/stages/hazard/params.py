@@ -34,6 +34,11 @@ class HazardParams:
             "measurement error."
         ),
     ] = 1.0
+    zone_warn_m: Annotated[
+        float,
+        Ge(0),
+        Doc("Warn when somebody is nearer than so many metres to a zone that he must not be in; inside is danger."),
+    ] = 1.0
     caution_sigmas: Annotated[
         float,
         Ge(0),

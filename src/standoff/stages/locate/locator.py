@@ -9,11 +9,11 @@ import numpy as np
 from standoff.core import homography
 from standoff.core.classes import CLASSES
 from standoff.core.homography import BoolArray, FloatArray
+from standoff.core.polygon import inside
 from standoff.core.types import GroundMap, GroundPositions, NoGroundMap, TextArray, Tracks
 from standoff.stages.locate import class_prior
 from standoff.stages.locate.ground_filter import GroundFilter
 from standoff.stages.locate.params import LocateParams
-from standoff.stages.locate.region import inside
 from standoff.stages.locate.uncertainty import (
     factor,
     horizon_margin,

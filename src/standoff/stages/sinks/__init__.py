@@ -5,7 +5,16 @@ from standoff.stages.sinks.hazards import HazardSink
 from standoff.stages.sinks.params import DrawParams, ReportParams, TableParams, VideoParams
 from standoff.stages.sinks.record import RecordSink
 from standoff.stages.sinks.report import ReportSink
-from standoff.stages.sinks.tables import DETECTIONS, FRAMES, PROXIMITY, TRACKS, Table, TableSink, detections_table
+from standoff.stages.sinks.tables import (
+    DETECTIONS,
+    FRAMES,
+    PROXIMITY,
+    TRACKS,
+    Table,
+    TableSink,
+    detections_table,
+    tracks_table,
+)
 from standoff.stages.sinks.video import Composer, VideoSink
 
 __all__ = [
@@ -27,4 +36,5 @@ __all__ = [
     "VideoSink",
     "detections_table",
     "prepare_output",
+    "tracks_table",
 ]

@@ -15,6 +15,7 @@ from standoff.stages.sinks.params import DrawParams
 from standoff.stages.sinks.scene import Scene
 from standoff.stages.sinks.sketch import Sketch
 from standoff.stages.sinks.text import TextSprites
+from standoff.stages.sinks.zone_drawing import ZoneDrawing
 
 _OUTSIDE_FOR_S = 2.0
 _DIMMED = 0.72
@@ -63,7 +64,12 @@ class BirdsEye:
         cv2.convertScaleAbs(panel, dst=panel, alpha=_DIMMED)
         _draw_axes(painter, self._window)
         _draw_scale_bar(painter, panel, self._window)
-        self._draw_entities(painter, sketch, self._window)
+        window = self._window
+        zones = ZoneDrawing(scene, lambda rings_m: [window.to_window(ring) for ring in rings_m], window.size_px)
+        zones.draw(painter)
+        self._draw_entities(painter, sketch, window)
+        if self._params.labels:
+            zones.label(painter)
 
     def _choose_window(self, scene: Scene, ground: GroundMap) -> None:
         placed = scene.positions.xy_m[scene.positions.valid]

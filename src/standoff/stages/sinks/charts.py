@@ -14,14 +14,19 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
+from matplotlib.patches import PathPatch
+from matplotlib.path import Path as Outline
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from standoff.core.homography import FloatArray
 from standoff.core.types import ImageArray
+from standoff.core.zones import Zone, ZoneKind, ring_middle
 from standoff.stages.sinks.collect import RunSummary
+from standoff.stages.sinks.ground_shapes import clip_to_box
 from standoff.stages.sinks.ground_window import rectify, window_around
 from standoff.stages.sinks.palette import HEX, class_tone
 from standoff.stages.sinks.series import Path, Series
+from standoff.stages.sinks.zone_drawing import largest_part
 
 INK, MUTED = "#010203", "#040506"
 """Stand-ins for the colours of text and of what matters less, which `inline_svg` replaces by the page's own."""
@@ -30,6 +35,8 @@ _SURFACE = "#070809"
 _FAINT_PAIRS = 20
 _PANELS = 6
 _PLAN_PX = 520
+_HATCH: dict[ZoneKind, str] = {"no_go": "///", "machine_only": "...", "crossing": "---"}
+_FIRST, _ON, _LAST = Outline.MOVETO, Outline.LINETO, Outline.CLOSEPOLY
 _STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",
     "font.family": "sans-serif",
@@ -134,6 +141,8 @@ def plan_chart(summary: RunSummary) -> str:
         background = _background(summary, low, high)
         if background is not None:
             axes.imshow(background, extent=(low[0], high[0], low[1], high[1]), alpha=0.55, zorder=0)
+        for zone in summary.placed_zones:
+            _plot_zone(axes, zone, low, high)
         for path in paths:
             _plot_path(axes, path)
         _name_paths(axes, paths, label_size_m=(high - low) * (0.11, 0.025))
@@ -168,6 +177,20 @@ def _finish_time_axis(axes: Axes, summary: RunSummary) -> None:
     axes.xaxis.set_major_formatter(FuncFormatter(clock))
     axes.xaxis.set_major_locator(MaxNLocator(8, steps=[1, 2, 3, 6, 10]))
     axes.grid(True, axis="y")
+
+
+def _plot_zone(axes: Axes, zone: Zone, low: FloatArray, high: FloatArray) -> None:
+    """Draw a zone and its name where it can be seen between two corners of the plan."""
+    # Outer rings and holes go round in opposite directions, which is how a path knows holes.
+    corners = np.concatenate([np.concatenate([ring, ring[:1]]) for ring in zone.rings_m])
+    codes = np.concatenate([[_FIRST, *[_ON] * (len(ring) - 1), _LAST] for ring in zone.rings_m])
+    style = {"edgecolor": HEX["zone"], "hatch": _HATCH[zone.kind], "linewidth": 1.6, "zorder": 1}
+    axes.add_patch(PathPatch(Outline(corners, codes), facecolor="none", **style))
+    part = largest_part([clip_to_box(outer, low, high) for outer, *_ in zone.polygons_m])
+    if part is not None:
+        box = {"facecolor": _SURFACE, "edgecolor": HEX["zone"], "pad": 2.0, "linewidth": 0.8}
+        x_m, y_m = ring_middle(part).tolist()
+        axes.annotate(zone.title, (x_m, y_m), ha="center", va="center", fontsize=8, bbox=box, zorder=2.5)
 
 
 def _plot_path(axes: Axes, path: Path) -> None:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from standoff.core.types import Frame, FrameResult, GroundMap, Hazard, ImageArray, NoGroundMap, Severity
+from standoff.core.zones import Zone
 from standoff.stages.sinks.moments import WorstMoments
 from standoff.stages.sinks.params import ReportParams
 from standoff.stages.sinks.scene import OpenHazards, Pair, Scene, worse
@@ -24,8 +25,9 @@ class HazardLife:
     """One hazard from its first event to its last.
 
     Attributes:
-        rule: "proximity" or "measurement".
+        rule: "proximity", "zone" or "measurement".
         names: What its tracks are called.
+        zone: Name of the zone; empty where it is of none.
         opened_s: Time of the first event.
         closed_s: Time of the last; None while open.
         severity: The gravest it had.
@@ -44,10 +46,23 @@ class HazardLife:
     gap_m: float = float("nan")
     sigma_m: float = float("nan")
     reason: str = ""
+    zone: str = ""
+
+    @property
+    def who(self) -> str:
+        """Whom it is about, for people."""
+        who = " and ".join(self.names) or "whole picture"
+        if self.zone:
+            return f"{who}: zone {self.zone}"
+        return who if self.rule == "proximity" else f"{who} ({self.rule})"
+
+    def lasted_s(self, last_s: float) -> float:
+        """Return how long it was open, up to the run's last frame."""
+        return (self.closed_s if self.closed_s is not None else last_s) - self.opened_s
 
     def measure(self, distance_m: float, gap_m: float, sigma_m: float) -> None:
         """Take a measurement; the smallest counts."""
-        if np.isfinite(distance_m) and not distance_m >= self.distance_m:
+        if np.isfinite(gap_m) and not gap_m >= self.gap_m:
             self.distance_m, self.gap_m, self.sigma_m = distance_m, gap_m, sigma_m
 
 
@@ -56,9 +71,11 @@ class RunSummary:
 
     Args:
         params: How much of each is kept.
+        zones: Of the site.
     """
 
-    def __init__(self, params: ReportParams) -> None:
+    def __init__(self, params: ReportParams, zones: tuple[Zone, ...] = ()) -> None:
+        self.zones = zones
         self._most_pairs = params.pairs
         self._open = OpenHazards()
         self._live_tracks: set[int] = set()
@@ -85,7 +102,7 @@ class RunSummary:
             self.first_s, self.stream_id, self.size_px = frame.time_s, frame.stream_id, frame.size_px
         self.last_s = frame.time_s
         self._open.update(result.hazards)
-        scene = Scene.of(result, self._open)
+        scene = Scene.of(result, self._open, self.zones)
         self._count(result)
         self._add_ground(frame, result.ground)
         self._add_paths(scene)
@@ -121,6 +138,7 @@ class RunSummary:
             self.no_map.add(frame.time_s, float("nan"), float("nan"), float("nan"))
             return
         self.map_methods[ground.method] += 1
+        self.counts["frames_with_zones"] += int(ground.frame_stated)
         self.no_map.add(frame.time_s, 0.0, 0.0, 0.0)
         if self.background is None:
             width = min(_BACKGROUND_WIDTH_PX, frame.size_px[0])
@@ -176,7 +194,9 @@ class RunSummary:
         for event in events:
             if event.hazard_id not in self.hazards and len(self.hazards) < _MOST_HAZARDS:
                 called = tuple(names.get(track_id, f"track {track_id}") for track_id in event.track_ids)
-                self.hazards[event.hazard_id] = HazardLife(event.rule, called, event.time_s, event.severity)
+                self.hazards[event.hazard_id] = HazardLife(
+                    event.rule, called, event.time_s, event.severity, zone=event.zone
+                )
             self.take_event(event)
         pairs = scene.proximities
         if not scene.hazards:
@@ -186,6 +206,16 @@ class RunSummary:
             if hazard is not None and hazard.hazard_id in self.hazards:
                 numbers = float(pairs.distance_m[k]), float(pairs.gap_m[k]), float(pairs.sigma_m[k])
                 self.hazards[hazard.hazard_id].measure(*numbers)
+
+    @property
+    def placed_zones(self) -> tuple[Zone, ...]:
+        """The zones, where all paths on the ground can be compared with them."""
+        mapped = sum(self.map_methods.values())
+        return self.zones if 0 < mapped == self.counts["frames_with_zones"] else ()
+
+    def of_zone(self, zone: Zone) -> list[HazardLife]:
+        """Return the hazards of a zone."""
+        return [hazard for hazard in self.hazards.values() if hazard.zone == zone.name]
 
     def take_event(self, event: Hazard) -> None:
         """Take an event of a known hazard."""

@@ -6,14 +6,16 @@ import numpy as np
 
 from standoff.core.homography import FloatArray
 from standoff.core.types import GroundMap, ImageArray, NoGroundMap
+from standoff.core.zones import NOT_PLACED
 from standoff.stages.sinks.fans import FAN_OPACITY, fans_of
-from standoff.stages.sinks.ground_shapes import circle_outlines_px
+from standoff.stages.sinks.ground_shapes import circle_outlines_px, outlines_in_sight_px
 from standoff.stages.sinks.painter import Painter
 from standoff.stages.sinks.palette import Tone, bgr
 from standoff.stages.sinks.params import DrawParams
 from standoff.stages.sinks.scene import Scene
 from standoff.stages.sinks.sketch import Sketch
 from standoff.stages.sinks.text import TextSprites
+from standoff.stages.sinks.zone_drawing import ZoneDrawing
 
 _LEGEND: tuple[tuple[Tone, str], ...] = (
     ("danger", "danger"),
@@ -23,6 +25,7 @@ _LEGEND: tuple[tuple[Tone, str], ...] = (
     ("unknown", "unknown"),
     ("light", "dashed: not seen now"),
 )
+_ZONE_LEGEND: tuple[Tone, str] = ("zone", "zone")
 _GRAVENESS: dict[Tone, int] = {"danger": 0, "warning": 1, "unknown": 2}
 
 
@@ -50,9 +53,17 @@ class Overlay:
         scene = sketch.scene
         painter = Painter(canvas, self._text, self._params.size)
         to_canvas = _ToCanvas(canvas, region_px if region_px is not None else np.array([0.0, 0.0, *scene.size_px]))
+        zones = None
         if isinstance(scene.ground, NoGroundMap):
             _draw_banner(painter, canvas, scene.ground.reason)
         else:
+            ground, (height, width) = scene.ground, canvas.shape[:2]
+            zones = ZoneDrawing(
+                scene,
+                lambda rings_m: [to_canvas(one) for one in outlines_in_sight_px(ground, rings_m)],
+                (width, height),
+            )
+            zones.draw(painter)
             _draw_anchors(painter, to_canvas, scene.ground)
             if self._params.circles:
                 _draw_circles(painter, to_canvas, sketch, scene.ground)
@@ -62,10 +73,12 @@ class Overlay:
         _draw_lines(painter, to_canvas, sketch)
         _draw_status(painter, canvas, scene)
         if self._params.legend:
-            _draw_legend(painter, canvas)
+            _draw_legend(painter, canvas, (*_LEGEND, _ZONE_LEGEND) if scene.zones else _LEGEND)
         if self._params.labels:
             _label_lines(painter, to_canvas, sketch)
             _label_boxes(painter, to_canvas, sketch)
+            if zones is not None:
+                zones.label(painter)
 
 
 class _ToCanvas:
@@ -152,7 +165,8 @@ def _label_lines(painter: Painter, to_canvas: _ToCanvas, sketch: Sketch) -> None
 def _label_boxes(painter: Painter, to_canvas: _ToCanvas, sketch: Sketch) -> None:
     scene, tones = sketch.scene, sketch.tones
     corners = to_canvas(scene.tracks.xyxy_px).reshape(-1, 4)
-    names = list(scene.names().values())
+    in_zones = scene.zone_words()
+    names = [f"{name}, {in_zones[track]}" if track in in_zones else name for track, name in scene.names().items()]
     has_map = isinstance(scene.ground, GroundMap)
     for i in sorted(range(len(tones)), key=lambda row: _GRAVENESS.get(tones[row], len(_GRAVENESS))):
         if not painter.shows(corners[i]):
@@ -173,13 +187,19 @@ def _draw_status(painter: Painter, canvas: ImageArray, scene: Scene) -> None:
         age = f", {scene.ground.age_s:.1f} s old" if scene.ground.age_s > 0 else ""
         text += f"   map: {scene.ground.method}{age}"
     margin = painter.font_px // 2
-    painter.label(text, [(margin, canvas.shape[0] - painter.label_size_px(text)[1] - margin)])
+    top = canvas.shape[0] - painter.label_size_px(text)[1] - margin
+    painter.label(text, [(margin, top)])
+    if isinstance(scene.ground, GroundMap) and scene.zones and not scene.placed_zones:
+        unknown = f"ZONES UNKNOWN: {NOT_PLACED}"
+        painter.label(
+            unknown, [(margin, top - 1.3 * painter.label_size_px(unknown)[1])], accent=bgr("unknown"), bold=True
+        )
 
 
-def _draw_legend(painter: Painter, canvas: ImageArray) -> None:
+def _draw_legend(painter: Painter, canvas: ImageArray, legend: tuple[tuple[Tone, str], ...]) -> None:
     margin = painter.font_px // 2
     right = canvas.shape[1] - margin
-    for tone, text in reversed(_LEGEND):
+    for tone, text in reversed(legend):
         width, height = painter.label_size_px(text)
         right -= width
         painter.label(text, [(right, canvas.shape[0] - height - margin)], accent=bgr(tone))

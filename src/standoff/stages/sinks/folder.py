@@ -17,6 +17,7 @@ OUTPUT_FILES: tuple[str, ...] = (
     "frames.parquet",
     "detections.parquet",
     "hazards.jsonl",
+    "zones.geojson",
     "annotated.mp4",
     "report.html",
 )

@@ -14,8 +14,8 @@ from standoff.files.json_text import json_line
 class HazardSink:
     """Write hazard events as JSON Lines; numbers that were not measured are null.
 
-    Each line has the hazard's own fields, `stream_id`, `frame` (index in the source; of the last frame for
-    what the end of the stream closed), and `classes`, one for each track.
+    Each line has the hazard's own fields (`zone` only where it is of one), `stream_id`, `frame` (index in the source;
+    of the last frame for what the end of the stream closed), and `classes`, one for each track.
 
     Args:
         path: The file, usually `hazards.jsonl`.
@@ -41,7 +41,8 @@ class HazardSink:
         for event in events:
             # a hazard may close after its track has gone, so its classes are those of its first event
             classes = self._classes.get(event.hazard_id, [])
-            line = {"stream_id": self._stream_id, "frame": self._frame, **asdict(event), "classes": classes}
+            fields = {name: value for name, value in asdict(event).items() if name != "zone" or value}
+            line = {"stream_id": self._stream_id, "frame": self._frame, **fields, "classes": classes}
             self._file.write(json_line(line))
             if event.phase == "closed":
                 self._classes.pop(event.hazard_id, None)

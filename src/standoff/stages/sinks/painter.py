@@ -82,20 +82,21 @@ class Painter:
         thickness = self.stroke_px if hollow else -1
         cv2.circle(self._canvas, centre, radius, colour, thickness, cv2.LINE_AA, _SHIFT)
 
-    def fill(self, outline_px: FloatArray, colour: Bgr, opacity: float) -> None:
-        """Tint the inside of an outline."""
+    def fill(self, outline_px: FloatArray, colour: Bgr, opacity: float, holes_px: Sequence[FloatArray] = ()) -> None:
+        """Tint the inside of an outline, without what is inside the outlines of holes."""
         if len(outline_px) < 3:
             return
         height, width = self._canvas.shape[:2]
-        outline = _fixed_point(outline_px)
-        left, top, wide, high = cv2.boundingRect(outline >> _SHIFT)
+        outlines = [_fixed_point(one) for one in (outline_px, *holes_px)]
+        left, top, wide, high = cv2.boundingRect(outlines[0] >> _SHIFT)
         x0, y0 = max(left, 0), max(top, 0)
         x1, y1 = min(left + wide, width), min(top + high, height)
         if x0 >= x1 or y0 >= y1:
             return
         area = self._canvas[y0:y1, x0:x1]
         tinted = area.copy()
-        cv2.fillPoly(tinted, [outline - np.array([x0, y0], dtype=np.int32) * (1 << _SHIFT)], colour, cv2.LINE_8, _SHIFT)
+        corner = np.array([x0, y0], dtype=np.int32) * (1 << _SHIFT)
+        cv2.fillPoly(tinted, [outline - corner for outline in outlines], colour, cv2.LINE_8, _SHIFT)
         cv2.addWeighted(tinted, opacity, area, 1.0 - opacity, 0.0, dst=area)
 
     def label_size_px(self, text: str, *, bold: bool = False) -> tuple[int, int]:

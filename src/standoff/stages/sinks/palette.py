@@ -9,7 +9,7 @@ from typing import Literal
 from standoff.core.classes import CLASSES, Role
 
 Bgr = tuple[int, int, int]
-Tone = Literal["danger", "warning", "unknown", "worker", "machine", "reference", "light", "dark"]
+Tone = Literal["danger", "warning", "unknown", "worker", "machine", "reference", "zone", "light", "dark"]
 
 HEX: Mapping[Tone, str] = MappingProxyType(
     {
@@ -19,6 +19,7 @@ HEX: Mapping[Tone, str] = MappingProxyType(
         "worker": "#1fc7b6",
         "machine": "#6ea8ff",
         "reference": "#c9a2ff",
+        "zone": "#ff86d3",
         "light": "#f4f6f8",
         "dark": "#14181d",
     }

@@ -74,6 +74,7 @@ class RecordSink:
         self._map_methods: Counter[str] = Counter()
         self._invalid: Counter[str] = Counter()
         self._hazard_severity: dict[str, Severity] = {}
+        self._hazard_zone: dict[str, str] = {}
         self._live_tracks: set[int] = set()
         self._live_pairs: set[tuple[int, int]] = set()
         self._stages: defaultdict[str, Durations] = defaultdict(Durations)
@@ -97,6 +98,15 @@ class RecordSink:
         for event in events:
             so_far = self._hazard_severity.get(event.hazard_id, "unknown")
             self._hazard_severity[event.hazard_id] = worse(event.severity, so_far)
+            if event.zone:
+                self._hazard_zone[event.hazard_id] = event.zone
+
+    def _zone_counts(self) -> dict[str, Counter[str]]:
+        """Return the number of hazards of each zone that had any, by severity."""
+        counts: dict[str, Counter[str]] = {}
+        for hazard_id, zone in sorted(self._hazard_zone.items(), key=lambda one: one[1]):
+            counts.setdefault(zone, Counter())[self._hazard_severity[hazard_id]] += 1
+        return counts
 
     def _count_rows(self, result: FrameResult) -> None:
         positions, pairs = result.positions, result.proximities
@@ -142,6 +152,7 @@ class RecordSink:
                 "counts": {
                     **self._counts,
                     "hazards": Counter(self._hazard_severity.values()),
+                    **({"zones": zones} if (zones := self._zone_counts()) else {}),
                     "map_methods": self._map_methods,
                     "no_ground_map": self._no_map,
                     "invalid_positions": self._invalid,

@@ -16,6 +16,7 @@ from markupsafe import Markup
 
 from standoff import __version__
 from standoff.core.types import FrameResult, Outcome
+from standoff.core.zones import NOT_PLACED, ZONE_WORDS, Zone
 from standoff.files.json_text import plain
 from standoff.files.whole import partial_path
 from standoff.stages.sinks.collect import HazardLife, RunSummary
@@ -40,6 +41,7 @@ class ReportSink:
         at_close: Gives those descriptions anew that are only known after the last frame; None: nothing is.
         checked: Gives after the last frame what the page says, in HTML, of how true the stated errors are, where truth
             is known; None or an empty text: they were not checked, and the page says so.
+        zones: Of the site.
     """
 
     def __init__(
@@ -51,12 +53,13 @@ class ReportSink:
         warning_gap_m: float = 1.0,
         at_close: Callable[[], Mapping[str, Any]] | None = None,
         checked: Callable[[], str] | None = None,
+        zones: tuple[Zone, ...] = (),
     ) -> None:
         self._checked = checked
         self._at_close = at_close
         self._path, self._warning_gap_m = Path(path), warning_gap_m
         self._descriptions = dict(descriptions or {})
-        self._summary = RunSummary(params or ReportParams())
+        self._summary = RunSummary(params or ReportParams(), zones)
 
     def write(self, result: FrameResult) -> None:
         """Take one frame."""
@@ -104,6 +107,8 @@ def render(
         site_chart=Markup(site_chart(summary, warning_gap_m)) if has_frames else "",
         pair_charts=Markup(pair_charts(summary, warning_gap_m)),
         plan_chart=Markup(plan_chart(summary)),
+        zones=[_zone_row(zone, summary) for zone in summary.zones],
+        unplaced=NOT_PLACED,
         moments=[(moment, _data_uri(moment.jpeg())) for moment in shown],
         warnings=descriptions.get("warnings", ()),
         basis=(ground := descriptions.get("ground") or {}).get("basis", ""),
@@ -112,6 +117,17 @@ def render(
         distance_text=distance_text,
         checked=Markup(checked),
     )
+
+
+def _zone_row(zone: Zone, summary: RunSummary) -> dict[str, Any]:
+    """Return what the table of zones says of one."""
+    lives = summary.of_zone(zone)
+    return {
+        "name": zone.name,
+        "kind": ZONE_WORDS[zone.kind],
+        "severities": Counter(life.severity for life in lives),
+        "open_s": sum(life.lasted_s(summary.last_s) for life in lives),
+    }
 
 
 def _gravest_first(hazard: HazardLife) -> tuple[int, float, float]:

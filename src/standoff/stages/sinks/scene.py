@@ -19,9 +19,12 @@ from standoff.core.types import (
     Severity,
     Tracks,
 )
+from standoff.core.zones import Zone
 from standoff.stages.sinks.palette import Tone, class_tone
 
 Pair = tuple[int, int]
+
+_GRAVENESS: tuple[Severity, ...] = ("unknown", "warning", "danger")
 
 
 class OpenHazards:
@@ -39,8 +42,13 @@ class OpenHazards:
                 self._open[event.hazard_id] = event
 
     def by_pair(self) -> dict[Pair, Hazard]:
-        """Return the open hazard of each pair of tracks."""
-        return {(e.track_ids[0], e.track_ids[1]): e for e in self._open.values() if len(e.track_ids) == 2}
+        """Return the open hazard of each pair of tracks that are too near to each other."""
+        pairs = (e for e in self._open.values() if len(e.track_ids) == 2 and not e.zone)
+        return {(e.track_ids[0], e.track_ids[1]): e for e in pairs}
+
+    def in_zones(self) -> tuple[Hazard, ...]:
+        """Return the open hazards of zones."""
+        return tuple(e for e in self._open.values() if e.zone)
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +64,8 @@ class Scene:
         positions: Row i belongs to track i.
         proximities: All configured pairs.
         hazards: Open hazards by pair.
+        zones: All of the site.
+        zone_hazards: Open hazards of zones.
     """
 
     frame_index: int
@@ -66,9 +76,11 @@ class Scene:
     positions: GroundPositions
     proximities: Proximities
     hazards: Mapping[Pair, Hazard]
+    zones: tuple[Zone, ...] = ()
+    zone_hazards: tuple[Hazard, ...] = ()
 
     @classmethod
-    def of(cls, result: FrameResult, open_hazards: OpenHazards) -> Scene:
+    def of(cls, result: FrameResult, open_hazards: OpenHazards, zones: tuple[Zone, ...] = ()) -> Scene:
         """Keep what is drawn of a result; the frame's pixels are let go."""
         return cls(
             frame_index=result.frame.index,
@@ -79,13 +91,35 @@ class Scene:
             positions=result.positions,
             proximities=result.proximities,
             hazards=open_hazards.by_pair(),
+            zones=zones,
+            zone_hazards=open_hazards.in_zones() if zones else (),
         )
+
+    @property
+    def placed_zones(self) -> tuple[Zone, ...]:
+        """The zones that can be found in this frame: somebody stated where its site frame lies."""
+        return self.zones if isinstance(self.ground, GroundMap) and self.ground.frame_stated else ()
+
+    def zone_tone(self, zone: Zone) -> Tone:
+        """Return the colour of a zone: of its gravest open hazard, else that of zones."""
+        severities: list[Severity] = [hazard.severity for hazard in self.zone_hazards if hazard.zone == zone.name]
+        return max(severities, key=_GRAVENESS.index) if severities else "zone"
+
+    def zone_words(self) -> dict[int, str]:
+        """Return what is wrong with each track that has a hazard in a zone: "in pit", "near gate", "perhaps in pit"."""
+        words: dict[int, list[str]] = {}
+        for hazard in self.zone_hazards:
+            unknown = hazard.phase == "unknown" or hazard.severity == "unknown"
+            where = "perhaps in" if unknown else "in" if hazard.severity == "danger" else "near"
+            for track_id in hazard.track_ids:
+                words.setdefault(track_id, []).append(f"{where} {hazard.zone}")
+        return {track_id: ", ".join(dict.fromkeys(texts)) for track_id, texts in words.items()}
 
     def track_tones(self) -> list[Tone]:
         """Return the colour of each track: of its gravest hazard, else of its class; grey when it has no position."""
         gravest: dict[int, Severity] = {}
-        for pair, hazard in self.hazards.items():
-            for track_id in pair:
+        for hazard in (*self.hazards.values(), *self.zone_hazards):
+            for track_id in hazard.track_ids:
                 gravest[track_id] = worse(hazard.severity, gravest.get(track_id, "unknown"))
         tones: list[Tone] = []
         for row, track_id in enumerate(self.tracks.track_id.tolist()):
@@ -131,5 +165,4 @@ def worse(severity: Severity, other: Severity) -> Severity:
     >>> worse("warning", "danger")
     'danger'
     """
-    order: tuple[Severity, ...] = ("unknown", "warning", "danger")
-    return max(severity, other, key=order.index)
+    return max(severity, other, key=_GRAVENESS.index)

@@ -22,6 +22,7 @@ from standoff.core.types import FrameResult, GroundMap, IntArray, NoGroundMap, O
 from standoff.files.json_text import plain
 from standoff.stages.sinks.params import TableParams
 from standoff.stages.sinks.parquet_parts import Columns, ParquetParts
+from standoff.stages.sinks.scene import OpenHazards
 
 _CLASS = pa.dictionary(pa.int32(), pa.string())
 _NAMES: TextArray = np.array([site_class.name for site_class in CLASSES], dtype=object)
@@ -56,6 +57,7 @@ _TRACK_COLUMNS = (
     ("standing_s", pa.float64(), "s", "for how long it has not moved; null while unknown"),
     ("sight", pa.string(), "", "observed; hidden: looked for and not found; predicted: not looked for; unknown"),
 )
+_ZONES_COLUMN = ("zones", pa.list_(pa.string()), "", "names of the zones that an open hazard of this track is about")
 _PROXIMITY_COLUMNS = (
     *_FRAME_COLUMNS,
     ("track_a", pa.int64(), "", "the smaller track id"),
@@ -266,6 +268,21 @@ def detections_table(source: Mapping[str, Any], detector: Mapping[str, Any] | No
     about = metadata_of((width_px, height_px), plain(source), plain(detector or {}))
     schema = DETECTIONS.schema
     return Table(schema.with_metadata({**(schema.metadata or {}), **about}), DETECTIONS.rows)
+
+
+def tracks_table() -> Table:
+    """Return `TRACKS` with a column for the zones of a site, for one run."""
+    hazards = OpenHazards()
+
+    def rows(result: FrameResult) -> Columns:
+        hazards.update(result.hazards)
+        of_track: dict[int, set[str]] = {}
+        for hazard in hazards.in_zones():
+            for track_id in hazard.track_ids:
+                of_track.setdefault(track_id, set()).add(hazard.zone)
+        return {**_track_rows(result), "zones": [sorted(of_track.get(i, ())) for i in result.tracks.track_id.tolist()]}
+
+    return Table(_schema((*_TRACK_COLUMNS, _ZONES_COLUMN)), rows)
 
 
 TRACKS = Table(_schema(_TRACK_COLUMNS), _track_rows)

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from standoff.core.types import FrameResult, ImageArray, Outcome
+from standoff.core.zones import Zone
 from standoff.stages.sinks.birdseye import BirdsEye
 from standoff.stages.sinks.drawing import Overlay
 from standoff.stages.sinks.encoder import VideoFile
@@ -69,10 +70,11 @@ class VideoSink:
     Args:
         path: The file, usually `annotated.mp4`.
         params: Sizes, quality and what is drawn.
+        zones: Of the site.
     """
 
-    def __init__(self, path: Path | str, params: VideoParams | None = None) -> None:
-        self._path, self._params = Path(path), params or VideoParams()
+    def __init__(self, path: Path | str, params: VideoParams | None = None, zones: tuple[Zone, ...] = ()) -> None:
+        self._path, self._params, self._zones = Path(path), params or VideoParams(), zones
         self._hazards = OpenHazards()
         self._composer: Composer | None = None
         self._file: VideoFile | None = None
@@ -88,7 +90,7 @@ class VideoSink:
         self._hazards.update(result.hazards)
         size_px = self._composer.picture_size_px
         picture = frame.image if size_px == frame.size_px else frame.picture.resized_bgr(*size_px)
-        composed = self._composer.compose(picture, Scene.of(result, self._hazards))
+        composed = self._composer.compose(picture, Scene.of(result, self._hazards, self._zones))
         self._file.write(composed, frame.time_s - self._start_s)
 
     def close(self, outcome: Outcome) -> None:

@@ -3,7 +3,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from standoff.stages.locate.region import inside
+from standoff.core.polygon import inside
 
 
 def test_inside_agrees_with_opencv_on_convex_and_concave_outlines() -> None:
