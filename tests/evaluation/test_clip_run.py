@@ -46,7 +46,7 @@ def settings_with(clip: Clip, loader_radius_m: float, excavator_radius_m: float)
     radius_m = {"worker": 0.0, "wheel_loader": loader_radius_m, "excavator": excavator_radius_m}
     overrides = {
         "locate": {"radius_m": radius_m, "anchor": "box_centre"},
-        "hazard": {"min_duration_s": 0.0},
+        "hazard": {"min_duration_s": 0.0, "rule": "distance"},
         "outputs": (),
     }
     return load_settings(clip.folder / "reference.yaml", overrides)

@@ -15,7 +15,7 @@ from standoff.stages.ground.solid import SolidState
 from standoff.stages.ground.solid_fit import Belief, SolidFit
 from standoff.stages.ground.solid_poses import AROUND, ground_around_px
 
-AMBIGUOUS = "the reference could lie in two ways"
+AMBIGUOUS = "the reference could lie in two ways; its height (square:2.89,height=0.4) or a camera file would tell"
 NOT_THERE = "no solid of the reference's shape fits the edges in its box"
 
 _RIVAL_SCORE, _RIVAL_PX = 0.9, 4.0
