@@ -55,7 +55,7 @@ def read_bboxes(boxes: Sequence[_Entry], path: Path) -> FloatArray:
 
 def _bbox(box: _Entry, outline: FloatArray | None) -> FloatArray:
     if outline is not None and not box.get("bbox"):
-        return CORNER_AND_EXTENT.from_edges(outline[None])[0]
+        return np.concatenate([outline[:2], outline[2:] - outline[:2]])
     numbers = number_array(box.get("bbox"), 1, texts=True)
     if len(numbers) != _SIDES:
         raise ValueError(f"{len(numbers)} numbers")

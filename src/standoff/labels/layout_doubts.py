@@ -15,6 +15,8 @@ from standoff.labels.source import SourcePicture
 
 _SLACK: Final = 0.02
 """Of the picture's sides; boxes of any layout stick out by so much."""
+_COUNTING_PX: Final = 1.0
+"""Between ways of counting pixels."""
 _LARGEST_ID: Final = 1e9
 _FEWEST_OUTSIDE: Final = 3
 _SHARE_OUTSIDE: Final = 0.1
@@ -128,6 +130,6 @@ def _all_boxes(pictures: Sequence[SourcePicture]) -> tuple[FloatArray, FloatArra
 
 def _inside(xyxy: FloatArray, size: FloatArray) -> BoolArray:
     """Tell which boxes (N, 4), counted from the picture's edge, have an area and lie in their pictures."""
-    slack = _SLACK * size
+    slack = _SLACK * size + _COUNTING_PX
     lies_in = (xyxy[:, :2] >= -slack).all(axis=1) & (xyxy[:, 2:] <= size + slack).all(axis=1)
     return np.asarray(lies_in & (_extents(xyxy) > 0).all(axis=1))

@@ -37,8 +37,8 @@ def read_voc(folder: Path) -> SourceSet:
     """Read a folder with `Annotations`; `ImageSets/Main/{train,val,test}.txt` say the splits where they are."""
     splits = _read_splits(folder / "ImageSets" / "Main")
     files = sorted((folder / "Annotations").rglob("*.xml"))
-    pictures, problems = read_each(files, partial(_read_picture, folder, splits))
-    pictures, notes = _from_first_pixel(pictures, folder)
+    read, problems = read_each(files, partial(_read_picture, folder, splits))
+    pictures, notes = _from_first_pixel(read, folder)
     check_layout(pictures, folder, CORNERS)
     labels = sorted({label for picture in pictures for label in picture.labels})
     return SourceSet(tuple(labels), pictures, [*problems, *notes])
