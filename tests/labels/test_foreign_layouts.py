@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,7 @@ import pytest
 import yaml
 from hypothesis import given
 from hypothesis import strategies as st
-from labelled_sets import by_stem, kinds, write_picture, write_yolo
+from labelled_sets import by_stem, kinds, write_coco, write_picture, write_yolo
 
 from standoff.core.errors import DataError
 from standoff.labels import Split, read_data
@@ -96,19 +95,6 @@ def test_no_cut_in_a_last_line_gives_another_box(like: str) -> None:
 
 
 # --- sets ---
-
-
-def write_coco(folder: Path, boxes: list[dict[str, Any]], count: int = 4, **more: object) -> Path:
-    """Write a COCO file of so many pictures with these annotations."""
-    images = []
-    for number in range(1, count + 1):
-        write_picture(folder / f"{number}.png", _SIDES, seed=number)
-        images.append({"id": number, "file_name": f"{number}.png", "width": _SIDES[0], "height": _SIDES[1]})
-    categories = [{"id": 1, "name": "worker"}, {"id": 2, "name": "excavator"}, {"id": 3, "name": "lorry"}]
-    content = {"images": images, "annotations": boxes, "categories": categories} | more
-    path = folder / "labels.json"
-    path.write_text(json.dumps(content))
-    return path
 
 
 def box_in(image_id: object, bbox: list[float], category_id: object = 1, **more: Any) -> dict[str, Any]:
