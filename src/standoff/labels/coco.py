@@ -109,7 +109,7 @@ def _open(path: Path, content: dict[str, Any], pictures: Path | None) -> _CocoFi
         for number, names in keypoints.items()
         if isinstance(names, list) and KEYPOINT in names
     }
-    folders, split = _folders(path, pictures), split_named(path.stem)
+    folders, split = _folders(path, pictures), split_named(path.stem) or split_named(path.parent.name)
     return _CocoFile(path, folders, labels, point_at, images, boxes, lost, shared, _doubtful(boxes, lost), split)
 
 
