@@ -77,6 +77,8 @@ def test_the_command_line_wins_over_the_environment_and_that_over_the_file(
         ("track: {max_cost_s: 2}\n", "did you mean max_coast_s?"),
         ("video: {draw: {circle: false}}\n", "video.draw has no setting 'circle'; did you mean circles?"),
         ("track: {high_score: 1.5}\n", "less than or equal to 1"),
+        ("every: true\n", "every: true where a number should be"),
+        ("ground: {reference: {square_m: 2, box_px: [true, 2, 30, 40]}}\n", "ground.reference.box_px: true where"),
         ("every: 0\n", "greater than or equal to 1"),
         ("outputs: [video, film]\n", "film"),
         ("locate: {radius_m: {digger: 3}}\n", "no class is called digger"),

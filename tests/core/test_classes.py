@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from standoff.core.classes import CLASS_BY_NAME, CLASSES, Role, class_ids
+from standoff.core.classes import CLASS_BY_NAME, CLASSES, Role, class_ids, names_by_line
 
 
 def test_an_id_is_the_place_in_the_list_and_names_are_distinct() -> None:
@@ -29,3 +29,35 @@ def test_every_class_has_one_role_and_whatever_moves_has_a_size() -> None:
 def test_there_is_exactly_one_reference_class_and_it_endangers_nobody() -> None:
     (reference,) = class_ids(Role.REFERENCE)
     assert CLASSES[reference].action_radius_m == 0.0
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "worker,excavator\n",
+        "worker; excavator",
+        "worker,\nexcavator,\nlorry\n",
+        "- worker\n- excavator\n",
+        "'worker'\n'excavator'\n",
+        "worker: 0\nexcavator: 1\n",
+        "1 worker\n2 excavator\n",
+        "1 excavator\n0 worker\n",
+    ],
+)
+def test_a_list_of_names_in_another_way_is_no_list_of_other_names(text: str) -> None:
+    with pytest.raises(ValueError, match=r"one a line|names alone"):
+        names_by_line(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "names"),
+    [
+        ("0 worker\n1: excavator\n", ("worker", "excavator")),
+        ("tench, Tinca tinca\ngoldfish\nshark, great\n", ("tench, Tinca tinca", "goldfish", "shark, great")),
+        ("0\n1\n2\n", ("0", "1", "2")),
+        ("3 axles\n4 axles\n", ("3 axles", "4 axles")),
+        ("no-entry\n- \n", ("no-entry", "-")),
+    ],
+)
+def test_names_are_as_they_stand(text: str, names: tuple[str, ...]) -> None:
+    assert names_by_line(text) == names

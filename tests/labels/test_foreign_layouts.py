@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,7 @@ import pytest
 import yaml
 from hypothesis import given
 from hypothesis import strategies as st
-from labelled_sets import by_stem, kinds, write_picture, write_yolo
+from labelled_sets import by_stem, kinds, write_coco, write_picture, write_yolo
 
 from standoff.core.errors import DataError
 from standoff.labels import Split, read_data
@@ -96,19 +95,6 @@ def test_no_cut_in_a_last_line_gives_another_box(like: str) -> None:
 
 
 # --- sets ---
-
-
-def write_coco(folder: Path, boxes: list[dict[str, Any]], count: int = 4, **more: object) -> Path:
-    """Write a COCO file of so many pictures with these annotations."""
-    images = []
-    for number in range(1, count + 1):
-        write_picture(folder / f"{number}.png", _SIDES, seed=number)
-        images.append({"id": number, "file_name": f"{number}.png", "width": _SIDES[0], "height": _SIDES[1]})
-    categories = [{"id": 1, "name": "worker"}, {"id": 2, "name": "excavator"}, {"id": 3, "name": "lorry"}]
-    content = {"images": images, "annotations": boxes, "categories": categories} | more
-    path = folder / "labels.json"
-    path.write_text(json.dumps(content))
-    return path
 
 
 def box_in(image_id: object, bbox: list[float], category_id: object = 1, **more: Any) -> dict[str, Any]:
@@ -289,3 +275,22 @@ def test_of_two_lost_paths_that_may_mean_one_picture_neither_is_taken(tmp_path: 
     data = read_data(write_coco(tmp_path, boxes, count=6, images=images[2:]))
     assert set(by_stem(data)) == {"3", "4", "1"}
     assert kinds(data).count("contradictory labels") == 1
+
+
+def test_coco_files_among_the_pictures_of_each_split_are_read(tmp_path: Path) -> None:
+    """As Roboflow exports them, with texts beside that are no labels."""
+    (tmp_path / "README.roboflow.txt").write_text("exported", encoding="utf-8")
+    for split in ("train", "valid"):
+        write_picture(tmp_path / split / "a.png", _SIDES, seed=len(split))
+        document = {
+            "images": [{"id": 0, "file_name": "a.png", "width": _SIDES[0], "height": _SIDES[1]}],
+            "annotations": [{"id": 1, "image_id": 0, "category_id": 1, "bbox": [10, 12, 20, 16], "area": 320}],
+            "categories": [{"id": 1, "name": "worker"}],
+        }
+        (tmp_path / split / "_annotations.coco.json").write_text(json.dumps(document), encoding="utf-8")
+    data = read_data(tmp_path)
+    assert {split: [len(one.xyxy_px) for one in pictures] for split, pictures in data.splits.items()} == {
+        "train": [1],
+        "val": [1],
+        "test": [],
+    }

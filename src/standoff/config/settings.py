@@ -8,7 +8,7 @@ from dataclasses import is_dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_type_hints
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ModelWrapValidatorHandler, model_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from standoff.config.markers import MarkerSettings, check_markers
@@ -230,6 +230,13 @@ class Settings(BaseSettings):
             _refuse_unknown(info.annotation, values.get(name), name)
         return values
 
+    @model_validator(mode="wrap")
+    @classmethod
+    def _refuse_boolean_numbers(cls, values: Any, handler: ModelWrapValidatorHandler[Settings]) -> Settings:  # noqa: ANN401
+        settings = handler(values)
+        _refuse_boolean(values, settings, "")
+        return settings
+
     @model_validator(mode="after")
     def _refuse_taken_names(self) -> Settings:
         taken = sorted(self.extra_outputs.keys() & {*OUTPUT_NAMES, "record"})
@@ -245,6 +252,19 @@ def _refuse_unknown(annotation: object, value: object, path: str) -> None:
         _refuse_unknown_key(value, hints, path)
         for key, inner in value.items():
             _refuse_unknown(hints[key], inner, f"{path}.{key}")
+
+
+def _refuse_boolean(given: object, made: object, path: str) -> None:
+    """Raise ValueError for true and false where a number was made of it: pydantic takes them for 1 and 0."""
+    if isinstance(given, Mapping):
+        for key, inner in given.items():
+            of_key = made.get(key) if isinstance(made, Mapping) else getattr(made, str(key), None)
+            _refuse_boolean(inner, of_key, f"{path}.{key}".lstrip("."))
+    elif isinstance(given, (list, tuple)) and isinstance(made, (list, tuple)):
+        for inner, of_inner in zip(given, made, strict=False):
+            _refuse_boolean(inner, of_inner, path)
+    elif isinstance(given, bool) and isinstance(made, (int, float)) and not isinstance(made, bool):
+        raise ValueError(f"{path}: {str(given).lower()} where a number should be")
 
 
 def _refuse_unknown_key(given: Mapping[str, object], known: Iterable[str], path: str) -> None:

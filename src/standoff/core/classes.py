@@ -8,9 +8,11 @@ machines are half their length plus 1 m of articulation, which nobody has publis
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import re
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import Enum
+from typing import Final
 
 
 class Role(Enum):
@@ -54,6 +56,16 @@ CLASSES: tuple[SiteClass, ...] = (
     SiteClass(6, "reference", Role.REFERENCE, 0.0, 0.0, 0.0, 0.0),
 )
 
+_BETWEEN: Final = re.compile(r"[,;|\t]")
+_NUMBERED: Final = re.compile(r"(\d{1,6})(?:\s|\s*[:.,;)=-])\s*([^\W\d].*)")
+_DRESSED: Final[Mapping[str, re.Pattern[str]]] = {
+    "with a comma at its end": re.compile(r".*,"),
+    "with a dash before it": re.compile(r"-\s.*"),
+    "in quotes": re.compile(r"([\"']).*\1,?"),
+    "with a number after it": re.compile(r".*\S\s*[:,;=\t]\s*\d+"),
+}
+"""Lists in another language's ways, by what its names have about them."""
+
 CLASS_BY_NAME: dict[str, SiteClass] = {site_class.name: site_class for site_class in CLASSES}
 
 
@@ -79,19 +91,39 @@ def names_in_list(names: Iterable[object]) -> tuple[str, ...]:
     for name in names:
         if isinstance(name, bool) or not isinstance(name, str | int):
             raise ValueError(f"the name {name!r}, which is no text; put it in quotes")
+    if len(names) == 1:
+        _refuse_several(str(names[0]))
     return tuple(str(name) for name in names)
 
 
 def names_by_line(text: str) -> tuple[str, ...]:
     r"""Return the names of a list with one a line; a line's number is the class id, so none may be empty.
 
-    Raises:
-        ValueError: A line between two names is empty; says which.
+    Class ids before the names are left away where they are those of the lines.
 
-    >>> names_by_line("worker\nexcavator\n\n")
-    ('worker', 'excavator')
+    Raises:
+        ValueError: A line between two names is empty, or the lines are no plain names; says which.
+
+    >>> names_by_line("worker\nexcavator\n\n"), names_by_line("0 worker\n1 excavator")
+    (('worker', 'excavator'), ('worker', 'excavator'))
     """
     names = tuple(line.strip() for line in text.rstrip().splitlines())
     if "" in names:
         raise ValueError(f"an empty line for class id {names.index('')}; write some word for an id that is not used")
+    if len(names) == 1:
+        _refuse_several(names[0])
+    for what, pattern in _DRESSED.items():
+        if names and all(pattern.fullmatch(name) for name in names[: max(1, len(names) - 1)]):
+            raise ValueError(f"{names[0]!r}, a name {what}; write the names alone")
+    numbered = [match for name in names if (match := _NUMBERED.fullmatch(name))]
+    ids = [int(match[1]) for match in numbered]
+    if ids and ids == list(range(len(names))):
+        return tuple(match[2] for match in numbered)
+    if ids and sorted(ids) in (list(range(len(names))), list(range(1, len(names) + 1))):
+        raise ValueError(f"{names[0]!r} for class id 0, a name after another number; write the names alone, in order")
     return names
+
+
+def _refuse_several(name: str) -> None:
+    if parts := _BETWEEN.findall(name):
+        raise ValueError(f"a single name {name!r} with {parts[0]!r} in it: are they several? Write one a line")

@@ -10,20 +10,23 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeGuard
 
 import numpy as np
 
 from standoff.core.boxes import unknown_points
 from standoff.core.errors import DataError
 from standoff.core.homography import FloatArray
+from standoff.files.number_lists import number_array
 from standoff.labels.coco_boxes import read_bboxes
 from standoff.labels.documents import read_json
 from standoff.labels.ground_points import KEYPOINT
-from standoff.labels.layout_doubts import check_counting, check_not_corners
+from standoff.labels.layout_doubts import CORNER_AND_EXTENT, check_counting, check_layout
 from standoff.labels.pictures import canvas_of
 from standoff.labels.places import elsewhere, find_named
 from standoff.labels.source import UNPLACEABLE, BadPicture, SourcePicture, SourceSet, read_each, split_named
+from standoff.labels.strays import mark_within
+from standoff.labels.truth import is_true
 from standoff.labels.types import Problem, Split
 
 _Entry = Mapping[str, Any]
@@ -82,7 +85,7 @@ def read_coco(paths: Sequence[Path], pictures: Path | None) -> SourceSet:
         check_counting(
             {_id(box, "category_id") for boxes in file.boxes.values() for box in boxes}, file.labels, file.path
         )
-    check_not_corners(found, paths[0], centred=False)
+    check_layout(found, paths[0], CORNER_AND_EXTENT)
     lost = [_lost(file.path, box) for file in files for box in file.lost]
     return SourceSet(
         tuple(dict.fromkeys(label for file in files for label in file.labels.values())), found, problems + lost
@@ -90,6 +93,7 @@ def read_coco(paths: Sequence[Path], pictures: Path | None) -> SourceSet:
 
 
 def _open(path: Path, content: dict[str, Any], pictures: Path | None) -> _CocoFile:
+    _refuse_strays(content, path)
     images, annotations, categories = (_entries(content, key, path) for key in ("images", "annotations", "categories"))
     named = sorted((entry for entry in categories if "name" in entry), key=lambda entry: _sortable(entry.get("id")))
     boxes: dict[_Id, list[_Entry]] = {_id(entry, "id"): [] for entry in images}
@@ -105,7 +109,7 @@ def _open(path: Path, content: dict[str, Any], pictures: Path | None) -> _CocoFi
         for number, names in keypoints.items()
         if isinstance(names, list) and KEYPOINT in names
     }
-    folders, split = _folders(path, pictures), split_named(path.stem)
+    folders, split = _folders(path, pictures), split_named(path.stem) or split_named(path.parent.name)
     return _CocoFile(path, folders, labels, point_at, images, boxes, lost, shared, _doubtful(boxes, lost), split)
 
 
@@ -124,11 +128,13 @@ def _doubtful(boxes: Mapping[_Id, Sequence[_Entry]], lost: Sequence[_Entry]) -> 
 
 
 def _id(entry: _Entry, key: str) -> _Id:
-    """Return an id, a number written as text as the number; whatever a damaged file has instead, as text."""
+    """Return an id, a number written as text or as 1.0 as the number; whatever a damaged file has instead, as text."""
     value = entry.get(key)
     if isinstance(value, str) and value.isascii() and value.isdecimal() and len(value) < _LONGEST_ID:
         return int(value)
-    return value if isinstance(value, (int, str)) else repr(value)
+    if isinstance(value, float) and value.is_integer() and abs(value) < _LARGEST:
+        return int(value)
+    return value if isinstance(value, (int, str)) and not isinstance(value, bool) else repr(value)
 
 
 def _lost(path: Path, entry: _Entry) -> Problem:
@@ -138,8 +144,11 @@ def _lost(path: Path, entry: _Entry) -> Problem:
 
 def _sortable(number: object) -> tuple[str, float, str]:
     """Order numbers as numbers, and whatever else somebody takes for ids as text."""
-    is_number = isinstance(number, (int, float)) and abs(number) < _LARGEST
-    return (type(number).__name__, float(number) if is_number else 0.0, str(number))  # type: ignore[arg-type]
+    return (type(number).__name__, float(number) if _is_number(number) else 0.0, str(number))
+
+
+def _is_number(value: object) -> TypeGuard[float]:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < _LARGEST
 
 
 def _folders(path: Path, pictures: Path | None) -> tuple[Path, ...]:
@@ -172,6 +181,10 @@ def _read_picture(listed: tuple[_CocoFile, _Entry]) -> SourcePicture:
     canvas = canvas_of(path, _stated_px(image, path), marked=bool(boxes))
     if _id(image, "id") in file.shared:
         raise BadPicture(path, f"its id {image.get('id')} is another picture's as well", "contradictory labels")
+    mark = mark_within({key: value for key, value in image.items() if key not in ("width", "height")})
+    if mark is not None:
+        found = f"`{mark}` in the image's own entry, where no annotation should be"
+        raise BadPicture(path, found, UNPLACEABLE)
     if not boxes and file.doubtful:
         found = f"no box, where {file.path.name} has {len(file.lost)} of pictures that it does not list"
         raise BadPicture(path, found, UNPLACEABLE)
@@ -185,7 +198,7 @@ def _read_picture(listed: tuple[_CocoFile, _Entry]) -> SourcePicture:
         canvas.size_px,
         tuple(file.labels[category] for category in categories),
         corners - 0.5,
-        np.array([bool(box.get("iscrowd")) for box in boxes], np.bool_),
+        np.array([_is_ignored(box, path) for box in boxes], np.bool_),
         file.split,
         str(image.get("scene", "")),
         _points(boxes, categories, file.point_at, path),
@@ -194,12 +207,32 @@ def _read_picture(listed: tuple[_CocoFile, _Entry]) -> SourcePicture:
     )
 
 
+def _is_ignored(box: _Entry, path: Path) -> bool:
+    try:
+        return any(is_true(box.get(mark)) for mark in ("iscrowd", "ignore"))
+    except ValueError as error:
+        raise BadPicture(path, f"an annotation with `iscrowd` or `ignore` {error}", "unreadable labels") from error
+
+
+def _refuse_strays(content: Mapping[str, Any], path: Path) -> None:
+    """Refuse annotations in another place than COCO has them: the pictures that they mark would have none."""
+    for key, value in content.items():
+        if key in ("info", "licenses", "images", "annotations", "categories") or not isinstance(value, list):
+            continue
+        if (mark := mark_within(value)) is not None or any("image_id" in one for one in value if isinstance(one, dict)):
+            raise DataError(
+                expected=f"all annotations of {path} in its list `annotations`",
+                found=f"`{mark or 'image_id'}` in `{key}`",
+                fix="export it again as a COCO annotation file of the kind `instances`",
+            )
+
+
 def _stated_px(image: _Entry, path: Path) -> tuple[float, float] | None:
     """Return the size that is stated; None where it is not, or 0."""
     width, height = image.get("width") or None, image.get("height") or None
     if width is None or height is None:
         return None
-    if not all(isinstance(side, (int, float)) and abs(side) < _LARGEST for side in (width, height)):
+    if not all(_is_number(side) for side in (width, height)):
         raise BadPicture(path, "a size that is not two numbers", "unreadable labels")
     return float(width), float(height)
 
@@ -212,8 +245,8 @@ def _points(boxes: Sequence[_Entry], categories: Sequence[_Id], point_at: Mappin
             continue
         start = 3 * point_at[category]
         try:
-            x, y, visibility = (float(number) for number in box["keypoints"][start : start + 3])
-        except (TypeError, ValueError, OverflowError) as error:
+            x, y, visibility = number_array(box["keypoints"], 1, texts=True)[start : start + 3]
+        except ValueError as error:
             raise BadPicture(path, "an annotation whose keypoints are not numbers", "unreadable labels") from error
         if visibility and np.isfinite([x, y]).all():
             points[row] = x - 0.5, y - 0.5

@@ -39,7 +39,7 @@ def read_set(path: Path, names: Sequence[str] | None = None, pictures: Path | No
             found="another kind of file" if path.exists() else "nothing",
             fix="check the path",
         )
-    if annotations := _coco_files(path / "annotations"):
+    if annotations := _coco_files(path / "annotations") or _coco_of_splits(path):
         return read_coco(annotations, pictures)
     if next((path / "Annotations").rglob("*.xml"), None) is not None:
         return read_voc(path)
@@ -85,3 +85,11 @@ def _coco_files(folder: Path) -> list[Path]:
     files = sorted(folder.glob("*.json")) if folder.is_dir() else []
     splits = [file for file in files if split_named(file.stem)]
     return splits or (files if len(files) == 1 else [])
+
+
+def _coco_of_splits(folder: Path) -> list[Path]:
+    """Return the annotation files that lie among the pictures of each split, as Roboflow exports them."""
+    found = [
+        path for split in sorted(folder.iterdir()) if split_named(split.name) for path in split.glob("*.coco.json")
+    ]
+    return sorted(found)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -14,38 +15,81 @@ from standoff.labels.source import SourcePicture
 
 _SLACK: Final = 0.02
 """Of the picture's sides; boxes of any layout stick out by so much."""
+_COUNTING_PX: Final = 1.0
+"""Between ways of counting pixels."""
 _LARGEST_ID: Final = 1e9
+_FEWEST_OUTSIDE: Final = 3
+_SHARE_OUTSIDE: Final = 0.1
+_MANY: Final = 100
+"""Boxes; of more, a tenth of so many outside is enough, where none is in the other layout."""
 
 
-def check_not_corners(pictures: Sequence[SourcePicture], source: Path, *, centred: bool) -> None:
-    """Refuse boxes whose width and height are really their right and lower edge.
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """What the four numbers of a box mean.
+
+    Attributes:
+        name: For people.
+        to_edges: (N, 4) numbers as left, top, right, bottom edges.
+        from_edges: The other way.
+    """
+
+    name: str
+    to_edges: Callable[[FloatArray], FloatArray]
+    from_edges: Callable[[FloatArray], FloatArray]
+
+
+def _extents(xyxy: FloatArray) -> FloatArray:
+    return xyxy[:, 2:] - xyxy[:, :2]
+
+
+CORNERS: Final = Layout("the left and the upper, the right and the lower edge, xyxy", np.array, np.array)
+"""Pascal VOC."""
+CORNER_AND_EXTENT: Final = Layout(
+    "the left and the upper edge, a width and a height, xywh",
+    lambda xywh: np.hstack([xywh[:, :2], xywh[:, :2] + xywh[:, 2:]]),
+    lambda xyxy: np.hstack([xyxy[:, :2], _extents(xyxy)]),
+)
+"""COCO."""
+CENTRE_AND_EXTENT: Final = Layout(
+    "the centre, a width and a height, cxcywh",
+    lambda cxcywh: np.hstack([cxcywh[:, :2] - cxcywh[:, 2:] / 2, cxcywh[:, :2] + cxcywh[:, 2:] / 2]),
+    lambda xyxy: np.hstack([(xyxy[:, :2] + xyxy[:, 2:]) / 2, _extents(xyxy)]),
+)
+"""YOLO."""
+_LAYOUTS: Final = (CORNERS, CORNER_AND_EXTENT, CENTRE_AND_EXTENT)
+
+
+def check_layout(pictures: Sequence[SourcePicture], source: Path, stated: Layout) -> None:
+    """Refuse a set whose boxes lie in their pictures in another layout only.
+
+    A box may stick out of its picture, or end before it begins, where it was badly drawn. So a single one tells only
+    where the other layout is one that few numbers have by chance: edges, which must be in order. Between a centre and a
+    corner several must tell.
 
     Args:
         pictures: Of the set.
         source: Where it is, for messages.
-        centred: Whether the first two numbers are the box's centre (YOLO); else its upper left corner (COCO).
+        stated: The layout that its kind has, in which the boxes were read.
 
     Raises:
-        DataError: As corners all boxes lie in their pictures; as they are read some do not.
+        DataError: Boxes leave their pictures, and in another layout none does.
     """
-    xyxy, size = _all_boxes(pictures)
-    second = xyxy[:, 2:] - xyxy[:, :2]
-    first = xyxy[:, :2] + 0.5 + (second / 2 if centred else 0.0)
-    as_corners = _inside(np.hstack([first, second]), size) & (second > first).all(axis=1)
-    if as_corners.all() and not _inside(xyxy + 0.5, size).all():
-        raise _other_layout(source, "a width and a height", "the right and the lower edge, xyxy")
-
-
-def check_not_extents(pictures: Sequence[SourcePicture], source: Path) -> None:
-    """Refuse boxes whose right and lower edge are really their width and height.
-
-    Raises:
-        DataError: Some end before they begin, and with widths and heights all lie in their pictures.
-    """
-    xyxy, size = _all_boxes(pictures)
-    end_early = (xyxy[:, 2:] < xyxy[:, :2]).any()
-    if end_early and _inside(np.hstack([xyxy[:, :2], xyxy[:, :2] + xyxy[:, 2:]]), size).all():
-        raise _other_layout(source, "the right and the lower edge", "a width and a height, xywh")
+    boxes, sizes = _all_boxes(pictures)
+    numbers = stated.from_edges(boxes + 0.5)
+    outside = ~_inside(boxes + 0.5, sizes)
+    if not outside.any():
+        return
+    others = [other for other in _LAYOUTS if other is not stated and _inside(other.to_edges(numbers), sizes).all()]
+    is_told = outside.sum() >= max(_FEWEST_OUTSIDE, _SHARE_OUTSIDE * min(len(boxes), _MANY))
+    ends_early = (_extents(boxes) < 0).any()
+    likely = [other for other in others if other is CORNERS or ends_early or is_told]
+    if likely:
+        raise DataError(
+            expected=f"{stated.name}, as the numbers of the boxes in {source}",
+            found="boxes that lie in their pictures only if those are " + ", or ".join(other.name for other in likely),
+            fix="export them again, in the layout that the file's kind has",
+        )
 
 
 def check_counting(used: Collection[object], known: Collection[object], source: Path) -> None:
@@ -85,14 +129,7 @@ def _all_boxes(pictures: Sequence[SourcePicture]) -> tuple[FloatArray, FloatArra
 
 
 def _inside(xyxy: FloatArray, size: FloatArray) -> BoolArray:
-    """Tell which boxes (N, 4), counted from the picture's edge, lie in their pictures."""
-    slack = _SLACK * size
-    return np.asarray((xyxy[:, :2] >= -slack).all(axis=1) & (xyxy[:, 2:] <= size + slack).all(axis=1))
-
-
-def _other_layout(source: Path, expected: str, found: str) -> DataError:
-    return DataError(
-        expected=f"{expected} as the last two numbers of the boxes in {source}",
-        found=f"boxes that lie in their pictures only if those are {found}",
-        fix="export them again, in the layout that the file's kind has",
-    )
+    """Tell which boxes (N, 4), counted from the picture's edge, have an area and lie in their pictures."""
+    slack = _SLACK * size + _COUNTING_PX
+    lies_in = (xyxy[:, :2] >= -slack).all(axis=1) & (xyxy[:, 2:] <= size + slack).all(axis=1)
+    return np.asarray(lies_in & (_extents(xyxy) > 0).all(axis=1))

@@ -151,7 +151,7 @@ def _check_splits(entry: Mapping[str, Any], where: str) -> None:
         raise DataError(expected=f"split: train, val or test in {where}", found=entry["split"], fix="correct it")
     for key, kind in (("held_out", (int, float)), ("groups", list)):
         for split, value in entry.get(key, {}).items():
-            if split not in ("val", "test") or not isinstance(value, kind):
+            if split not in ("val", "test") or isinstance(value, bool) or not isinstance(value, kind):
                 raise DataError(
                     expected=f"`{key}` of val and test in {where}", found=f"{split}: {value}", fix="correct it"
                 )

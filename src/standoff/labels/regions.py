@@ -9,8 +9,10 @@ import numpy as np
 
 from standoff.core.errors import DataError
 from standoff.core.homography import FloatArray
+from standoff.files.number_lists import number_array
 from standoff.labels.documents import read_yaml
 
+_SIDES: Final = 4
 OWN_REGIONS: Final = "ignore.yaml"
 """In a set's folder: the regions that it says itself nothing is known of, as simulated composites have them."""
 
@@ -38,7 +40,9 @@ def read_regions(path: Path) -> dict[str, FloatArray]:
 def corners_of(boxes: object) -> FloatArray | None:
     """Return (N, 4) left, top, right, bottom as YAML gives them; None where it is something else."""
     try:
-        corners = np.array(boxes, dtype=np.float64).reshape(-1, 4)
-    except (TypeError, ValueError):
+        corners = number_array(boxes, 2) if boxes != [] else np.zeros((0, 4))
+    except ValueError:
+        return None
+    if corners.shape[1] != _SIDES:
         return None
     return corners if np.isfinite(corners).all() and (corners[:, :2] <= corners[:, 2:]).all() else None

@@ -21,12 +21,13 @@ from standoff.core.homography import FloatArray
 from standoff.files.plain_text import read_text
 from standoff.labels.documents import read_yaml
 from standoff.labels.ground_points import POINTS_FOLDER, in_pixels, read_points
-from standoff.labels.layout_doubts import check_counting, check_not_corners
+from standoff.labels.layout_doubts import CENTRE_AND_EXTENT, check_counting, check_layout
 from standoff.labels.pictures import Canvas, canvas_of, find_pictures
 from standoff.labels.places import elsewhere, find_named, first_there
 from standoff.labels.source import UNPLACEABLE, BadPicture, SourcePicture, SourceSet, read_each, split_named
 from standoff.labels.types import SPLITS, Problem, Split
 from standoff.labels.yolo_rows import KeypointShape, Unplaceable, read_rows
+from standoff.labels.yolo_yaml import SPLIT_KEYS, check_count, check_keys, keypoints_of
 
 _NAME_FILES: Final = ("classes.txt", "obj.names", "labels/classes.txt")
 
@@ -69,14 +70,16 @@ def read_yolo_yaml(path: Path, names: Sequence[str] | None) -> SourceSet:
         names: Labels by class id; None: those of the file.
 
     Raises:
-        DataError: The file, a folder or a list of it cannot be used.
+        DataError: The file, a folder or a list of it cannot be used, or it contradicts itself.
     """
     content = read_yaml(path)
     labels = tuple(names) if names is not None else labels_of(content.get("names"), path)
-    meaning = _Meaning(labels, _keypoints(content.get("kpt_shape"), path))
+    check_keys(content, path)
+    check_count(content.get("nc"), labels, path)
+    meaning = _Meaning(labels, keypoints_of(content.get("kpt_shape"), path))
     root, notes = _root(str(content.get("path") or "."), path)
     listed: list[_Listed] = []
-    for key in ("train", "val", "valid", "test"):
+    for key in SPLIT_KEYS:
         places = content.get(key) or ()
         for place in places if isinstance(places, (list, tuple)) else (places,):
             found = _pictures_at((root, path.parent), str(place), path)
@@ -158,19 +161,6 @@ def _read_names(folder: Path) -> tuple[str, ...]:
     )
 
 
-def _keypoints(shape: object, path: Path) -> KeypointShape | None:
-    if shape is None:
-        return None
-    match shape:
-        case [int(number), 2 | 3 as each] if number > 0:
-            return number, int(each)
-    raise DataError(
-        expected=f"`kpt_shape` in {path}: how many keypoints, and 2 or 3 values of each",
-        found=repr(shape),
-        fix="correct it",
-    )
-
-
 def _root(text: str, path: Path) -> tuple[Path, list[Problem]]:
     """Return the folder that paths in a data.yaml start from: its own where the one that it names is not there."""
     root, reading = find_named(text, (path.parent,), Path.is_dir)
@@ -213,7 +203,7 @@ def _split_of(relative: Path) -> Split | None:
 def _read_listed(listed: Sequence[_Listed], meaning: _Meaning, source: Path, notes: Sequence[Problem]) -> SourceSet:
     pictures, problems = read_each(listed, partial(_read_picture, meaning))
     check_counting(meaning.used, range(len(meaning.labels)), source)
-    check_not_corners(pictures, source, centred=True)
+    check_layout(pictures, source, CENTRE_AND_EXTENT)
     return SourceSet(meaning.labels, pictures, [*notes, *problems])
 
 
@@ -276,10 +266,12 @@ def _label_file(picture: Path) -> Path:
     """Return the label file: in `labels` where the picture is in `images`, else beside it."""
     apart = _sibling(picture, "labels")
     places = [*([apart] if apart else []), picture.with_suffix(".txt")]
-    file = first_there(places)
-    if file is None:
+    files = [place for place in places if first_there([place])]
+    if not files:
         raise BadPicture(picture, f"no label file at {places[0]}", "label file missing")
-    return file
+    if len(files) > 1 and files[0].read_bytes().split() != files[1].read_bytes().split():
+        raise BadPicture(picture, f"{files[0]} and {files[1]} say different things", "contradictory labels")
+    return files[0]
 
 
 def _sibling(picture: Path, folder: str) -> Path | None:

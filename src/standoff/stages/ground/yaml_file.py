@@ -10,6 +10,7 @@ import numpy as np
 
 from standoff.core.errors import GroundError
 from standoff.core.homography import FloatArray
+from standoff.files.number_lists import number_array
 from standoff.files.yaml_text import read_yaml
 
 
@@ -62,15 +63,12 @@ def numbers(value: object, shape: tuple[int, ...], where: str) -> FloatArray:
            [3. , 4.5]])
     """
     wanted = "a number" if shape == () else "x".join("N" if size == -1 else str(size) for size in shape) + " numbers"
-    found, array = f"{value!r}"[:80], np.full(0, np.nan)
+    found = f"{value!r}"[:80]
     try:
-        raw = np.array(value)
-        if raw.dtype.kind in "iuf":
-            array = raw.astype(np.float64)
-    except ValueError:
-        found = "rows of different lengths"
-    fits = array.ndim == len(shape) and all(s in (-1, n) for s, n in zip(shape, array.shape, strict=True))
-    if not fits:
+        array = number_array(value, len(shape))
+    except ValueError as error:
+        raise GroundError(expected=f"{wanted} for {where}", found=f"{found}, {error}", fix="correct the file") from None
+    if not all(size in (-1, given) for size, given in zip(shape, array.shape, strict=True)):
         raise GroundError(expected=f"{wanted} for {where}", found=found, fix="correct the file")
     if not np.isfinite(array).all():
         raise GroundError(expected=f"finite numbers for {where}", found=found, fix="correct the file")
