@@ -220,6 +220,16 @@ def test_what_the_edge_cuts_off_is_predicted_from_where_it_was_whole() -> None:
     assert late.reason.tolist() == ["cut off by the picture's edge"]
 
 
+def test_what_was_cut_off_just_before_is_so_still() -> None:
+    """Loose boxes leave the edge for a frame, and what stands there is elsewhere all the same."""
+    locator, ground = Locator(FEET), ground_map()
+    edge, inside = box_with_foot_at(960.0, 1079.0), box_with_foot_at(960.0, 1060.0)
+    told = []
+    for step, box in enumerate([edge, inside, edge, inside, inside, inside, inside, inside]):
+        told.append(bool(locator.update(0.1 * step, tracks_of(box), ground).valid[0]))
+    assert told == [False] * 5 + [True] * 3
+
+
 def test_ground_of_unknown_height_makes_a_place_unsure_along_the_view_only() -> None:
     tracks, height_m = tracks_of(standing(seen_px(GROUND_M))), 0.5
     level, rough = (

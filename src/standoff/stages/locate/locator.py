@@ -30,6 +30,9 @@ OUTSIDE_MAP = "outside the ground map"
 NOT_SEEN = "not seen any more"
 
 _TIME_ROUNDING_S = 1e-6
+_EDGE_SIGMAS = 2.0
+_WHOLE_S = 0.3 - _TIME_ROUNDING_S
+"""What was cut off just before is, its box being loose, cut off still."""
 _TOP_COUNTS_BELOW = 0.9
 """Level in the box below which an anchor moves with the upper edge by more than with anything else."""
 
@@ -67,6 +70,7 @@ class Locator:
     def __init__(self, params: LocateParams | None = None) -> None:
         self._params = params or LocateParams()
         self._filter = GroundFilter()
+        self._cut_off_s: dict[int, float] = {}
         self._factored: tuple[GroundMap, FloatArray] | None = None
         self._site_frame = 0
         self._class_radius_m = np.array([self._params.radius_m.get(c.name, c.action_radius_m) for c in CLASSES])
@@ -93,6 +97,7 @@ class Locator:
             self._filter.reset()
             self._site_frame = ground.site_frame
         measured = self._measure(tracks, ground)
+        self._stay_cut_off(time_s, tracks, measured.reason)
         taken = (measured.reason == "") & tracks.observed
         filtered = self._filter.update(
             time_s, tracks.track_id, tracks.class_id, np.where(taken[:, None], measured.xy_m, np.nan),
@@ -125,7 +130,19 @@ class Locator:
     def reset(self) -> None:
         """Forget all tracks."""
         self._filter.reset()
+        self._cut_off_s = {}
         self._factored = None
+
+    def _stay_cut_off(self, time_s: float, tracks: Tracks, reason: TextArray) -> None:
+        """Let what was cut off a moment ago be so still, in place, and remember what is."""
+        ids = tracks.track_id.tolist()
+        since = {track: at_s for track, at_s in self._cut_off_s.items() if track in ids}
+        for row, track in enumerate(ids):
+            if reason[row] == CUT_OFF:
+                since[track] = time_s
+            elif reason[row] == "" and time_s - since.get(track, -np.inf) < _WHOLE_S:
+                reason[row] = CUT_OFF
+        self._cut_off_s = since
 
     def _nowhere(self, tracks: Tracks, reason: str) -> GroundPositions:
         count = len(tracks)
@@ -204,7 +221,7 @@ class Locator:
 
     def _cut_off(self, tracks: Tracks, level: FloatArray, size_px: tuple[int, int]) -> BoolArray:
         """Tell (M,) which boxes may go on outside the picture on a side that their anchor depends on."""
-        margin_px = np.maximum(self._edge_sigma(tracks), self._params.cut_off_margin_px)
+        margin_px = np.maximum(_EDGE_SIGMAS * self._edge_sigma(tracks), self._params.cut_off_margin_px)
         # The outermost pixels have their centres on 0 and size - 1, their outer edges half a pixel further.
         touches_low = tracks.xyxy_px[:, :2] < margin_px - 0.5
         touches_high = tracks.xyxy_px[:, 2:] > np.array(size_px) - 0.5 - margin_px

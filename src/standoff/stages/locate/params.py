@@ -68,7 +68,7 @@ class LocateParams:
         float,
         Ge(0),
         Doc(
-            "A box that comes this near to the picture's edge, in pixels, or as near as the standard error of its own "
+            "A box that comes this near to the picture's edge, in pixels, or within two standard errors of its own "
             "edge, may go on outside: it is not located."
         ),
     ] = 1.5
