@@ -145,6 +145,7 @@ def _known_so_far(source: Source, pipeline: Pipeline) -> dict[str, Any]:
     return {
         "source": source.description,
         "ground": getattr(pipeline.ground, "description", None),
+        "alarms": getattr(pipeline.hazard, "description", {}).get("alarms"),
         "warnings": _warnings(source, pipeline),
     }
 

@@ -10,3 +10,4 @@ ROLE_OF_CLASS = np.array([list(Role).index(site_class.role) for site_class in CL
 """By class id, the position of its role in `Role`."""
 
 REFERENCE_ROLE = list(Role).index(Role.REFERENCE)
+PERSON_ROLE = list(Role).index(Role.PERSON)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 from standoff.core.homography import BoolArray
 from standoff.core.types import GroundMap, GroundPositions, Hazard, NoGroundMap, Proximities
@@ -11,6 +12,7 @@ from standoff.core.zones import Zone
 from standoff.stages.hazard.absence import AbsenceWatch
 from standoff.stages.hazard.follow import FollowWatch
 from standoff.stages.hazard.life import NOT_MEASURED, NOT_WATCHED, TRACK_LOST, Reading
+from standoff.stages.hazard.load import AlarmLoad
 from standoff.stages.hazard.pair import PairWatch
 from standoff.stages.hazard.params import HazardParams
 from standoff.stages.hazard.zone import ZoneRule
@@ -43,13 +45,15 @@ class HazardMonitor:
         self._map = AbsenceWatch(self._params, MAP_IS_BACK)
         self._follow = FollowWatch(self._params)
         self._pairs: dict[Pair, PairWatch] = {}
+        self._load = AlarmLoad()
         self._looked_s = math.inf
         self._zones = ZoneRule(self._given_zones, self._params)
 
     @property
-    def description(self) -> dict[str, list[str]]:
+    def description(self) -> dict[str, Any]:
         """What there is to say of the stream so far, for the record."""
-        return {"warnings": [*self._follow.warnings, *self._zones.warnings]}
+        warnings = [*self._follow.warnings, *self._zones.warnings, *self._load.warnings]
+        return {"alarms": self._load.description, "warnings": warnings}
 
     def update(
         self,
@@ -86,7 +90,9 @@ class HazardMonitor:
                 reason = reasons.get(pair[0]) or reasons.get(pair[1]) or NOT_MEASURED
                 events.append(watch.miss(time_s, reason, may_open=bool(ground)))
         self._pairs = {pair: watch for pair, watch in self._pairs.items() if watch.is_open or pair in readings}
-        return _said(events + self._zones.update(time_s, positions, ground, rare=rare))
+        events += self._zones.update(time_s, positions, ground, rare=rare)
+        self._load.update(time_s, positions, events)
+        return _said(events)
 
     def close(self, time_s: float) -> tuple[Hazard, ...]:
         """End the stream: close everything that is open."""
@@ -101,6 +107,7 @@ class HazardMonitor:
         self._map = AbsenceWatch(self._params, MAP_IS_BACK)
         self._follow = FollowWatch(self._params)
         self._pairs = {}
+        self._load = AlarmLoad()
         self._looked_s = math.inf
         self._zones = ZoneRule(self._given_zones, self._params)
 

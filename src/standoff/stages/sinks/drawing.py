@@ -12,7 +12,7 @@ from standoff.stages.sinks.ground_shapes import circle_outlines_px, outlines_in_
 from standoff.stages.sinks.painter import Painter
 from standoff.stages.sinks.palette import Tone, bgr
 from standoff.stages.sinks.params import DrawParams
-from standoff.stages.sinks.scene import Scene
+from standoff.stages.sinks.scene import ASSISTANCE, Scene
 from standoff.stages.sinks.sketch import Sketch
 from standoff.stages.sinks.text import TextSprites
 from standoff.stages.sinks.zone_drawing import ZoneDrawing
@@ -189,6 +189,8 @@ def _draw_status(painter: Painter, canvas: ImageArray, scene: Scene) -> None:
     margin = painter.font_px // 2
     top = canvas.shape[0] - painter.label_size_px(text)[1] - margin
     painter.label(text, [(margin, top)])
+    top -= 1.3 * painter.label_size_px(ASSISTANCE)[1]
+    painter.label(ASSISTANCE, [(margin, top)])
     if isinstance(scene.ground, GroundMap) and scene.zones and not scene.placed_zones:
         unknown = f"ZONES UNKNOWN: {NOT_PLACED}"
         painter.label(

@@ -22,6 +22,7 @@ from standoff.files.whole import partial_path
 from standoff.stages.sinks.collect import HazardLife, RunSummary
 from standoff.stages.sinks.pair_lines import distance_text
 from standoff.stages.sinks.params import ReportParams
+from standoff.stages.sinks.scene import ASSISTANCE
 
 _MOST_ROWS = 200
 _MOMENT_MARGIN_M = 5.0
@@ -115,6 +116,7 @@ def render(
         better=ground.get("better", ""),
         descriptions={heading: list(_flat(plain(value))) for heading, value in descriptions.items() if value},
         distance_text=distance_text,
+        assistance=ASSISTANCE,
         checked=Markup(checked),
     )
 
