@@ -51,6 +51,9 @@ class OpenHazards:
         return tuple(e for e in self._open.values() if e.zone)
 
 
+ASSISTANCE = "Assistance only: no certified safety function, no replacement for a banksman or an exclusion zone"
+
+
 @dataclass(frozen=True, slots=True)
 class Scene:
     """One frame's measurements.
