@@ -7,7 +7,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import av
@@ -201,71 +200,6 @@ def test_a_second_run_into_the_same_folder_needs_overwrite(call: Call, video: Pa
     assert "--overwrite" in err
     assert (tmp_path / "out" / "run.json").read_text() == before
     assert call(*words, "--overwrite")[0] == 0
-
-
-def _empty(folder: Path) -> Path:
-    (folder / "empty.mp4").touch()
-    return folder / "empty.mp4"
-
-
-def _text(folder: Path) -> Path:
-    (folder / "text.mp4").write_text("not a film\n" * 100)
-    return folder / "text.mp4"
-
-
-def _folder_with_strangers(folder: Path) -> Path:
-    (folder / "pictures").mkdir()
-    cv2.imwrite(str(folder / "pictures" / "1.png"), np.zeros((240, 320, 3), np.uint8))
-    (folder / "pictures" / "notes.txt").write_text("hello")
-    return folder / "pictures"
-
-
-@pytest.mark.parametrize(
-    ("make", "telling"),
-    [
-        (lambda folder: folder / "none.mp4", "none.mp4"),
-        (_empty, "empty"),
-        (_text, "text.mp4"),
-        (_folder_with_strangers, "notes.txt"),
-    ],
-)
-def test_a_bad_source_is_one_line_exit_2_and_no_folder(
-    call: Call, site: Path, tmp_path: Path, make: Callable[[Path], Path], telling: str
-) -> None:
-    code, out, err = call("run", make(tmp_path), "--config", site, "--fps", 10, "--out", tmp_path / "out")
-    assert (code, out) == (2, "")
-    assert err.startswith("standoff: expected ") and err.count("\n") == 1
-    assert telling in err
-    assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.parametrize(
-    ("words", "telling"),
-    [
-        (("--ground", "square:nonsense"), "--ground square:SIDE"),
-        (("--ground", "square:-1"), "square_m"),
-        (("--ground", "polygon:0,0,2,0,1"), "6 numbers with commas for --ground polygon:X,Y"),
-        (("--ground", "polygon:0,0,2,0,1,1,1"), "8 numbers with commas"),
-        (("--ground", "polygon:0,0,1,1,1,0,0,1"), "cross each other"),
-        (("--ground", "regular:2,1.5"), "3 to 12 corners"),
-        (("--reference-box", "1,2,3"), "4 numbers"),
-        (("--ground", "none", "--reference-box", "1,2,3,4"), "--ground square:SIDE"),
-        (("--ground", "missing.yaml"), "missing.yaml"),
-        (("--camera", "missing.yaml"), "missing.yaml"),
-        (("--outputs", "film"), "film"),
-        (("--every", "0"), "every"),
-        (("--start", "100"), "100"),
-        (("--config", "missing.yaml"), "missing.yaml"),
-    ],
-)
-def test_a_bad_option_is_one_line_exit_2_and_no_folder(
-    call: Call, video: Path, site: Path, tmp_path: Path, words: tuple[str, ...], telling: str
-) -> None:
-    code, out, err = call("run", video, "--config", site, "--out", tmp_path / "out", *words)
-    assert (code, out) == (2, "")
-    assert err.startswith("standoff: expected ") and err.count("\n") == 1
-    assert telling in err
-    assert not (tmp_path / "out").exists()
 
 
 def test_a_truncated_video_keeps_what_was_read_and_says_that_it_is_not_all(

@@ -6,7 +6,6 @@ Arrays are copied and checked once, at construction, and are read-only afterward
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
@@ -17,6 +16,9 @@ import numpy.typing as npt
 
 from standoff.core.ground_map import GroundMap as GroundMap
 from standoff.core.ground_map import NoGroundMap as NoGroundMap
+from standoff.core.hazard_event import Hazard as Hazard
+from standoff.core.hazard_event import Phase as Phase
+from standoff.core.hazard_event import Severity as Severity
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.motions import CameraMotion as CameraMotion
 from standoff.core.motions import NoCameraMotion as NoCameraMotion
@@ -315,48 +317,6 @@ class Proximities(Rows):
         Rows.__post_init__(self)
         if (self.track_a >= self.track_b).any():
             raise ValueError("Proximities.track_a must be smaller than track_b")
-
-
-Severity = Literal["warning", "danger", "unknown"]
-Phase = Literal["opened", "updated", "closed", "unknown"]
-
-
-@dataclass(frozen=True, slots=True)
-class Hazard:
-    """One event in the life of a hazard; all events of one hazard share `hazard_id`.
-
-    Attributes:
-        hazard_id: ULID.
-        rule: "proximity"; "zone" for who is where he must not be; "measurement" when the stream as a whole cannot be
-            measured.
-        severity: Of the hazard at this event; "unknown" when it was never measured.
-        phase: "opened" first, "closed" last; "unknown" while it cannot be measured.
-        track_ids: The pair, smaller id first; of a zone that nobody may be in the one track, of a crossing both; empty
-            where it is of the whole stream.
-        time_s: Presentation timestamp.
-        distance_m: Centre to centre, or to the zone, 0 in it; of two in a crossing, of the one further out; NaN while
-            unknown.
-        gap_m: Distance less both action radii, or to the zone's edge, negative inside; NaN while unknown.
-        sigma_m: Standard error of the distance; NaN while unknown.
-        reason: Why it is unknown or why it closed; empty otherwise.
-        breach_now: Probability that the gap is negative; NaN while unknown.
-        breach_ahead: Probability that it is, or will be within the horizon; NaN while unknown.
-        zone: Name of the zone; empty for other rules, and where no zone can be watched.
-    """
-
-    hazard_id: str
-    rule: str
-    severity: Severity
-    phase: Phase
-    track_ids: tuple[int, ...]
-    time_s: float
-    distance_m: float
-    gap_m: float
-    sigma_m: float
-    reason: str = ""
-    breach_now: float = math.nan
-    breach_ahead: float = math.nan
-    zone: str = ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -7,8 +7,9 @@ How machines lie, and where their arms and blades are, no box tells: that is in 
 
 D / H and the errors are medians over what `standoff simulate dataset` shows from 4 to 60 m: 2247 whole boxes of 400
 pictures. With them the median error falls from 2.1 to 0.6 m for wheel loaders, 3.1 to 0.5 for dump trucks, 1.8 to 0.4
-for rollers and dozers, 1.4 to 0.4 for vehicles and 2.6 to 1.8 for excavators, whose boom may be anywhere. The errors of dump trucks and of rollers
-and dozers were widened by half after six films of seeds 613 and 623, in which loose boxes held 62 and 84 % inside 95 %.
+for rollers and dozers, 1.4 to 0.4 for vehicles and 2.6 to 1.8 for excavators, whose boom may be anywhere. The errors of
+dump trucks and of rollers and dozers were widened by half after six films of seeds 613 and 623, in which loose boxes
+held 62 and 84 % inside 95 %.
 """
 
 from __future__ import annotations
