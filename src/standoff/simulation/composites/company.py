@@ -141,9 +141,7 @@ class _Floor:
         return True
 
 
-def _add_machines(
-    rng: np.random.Generator, floor: _Floor, company: Company, mesh: Path | None, most: int
-) -> None:
+def _add_machines(rng: np.random.Generator, floor: _Floor, company: Company, mesh: Path | None, most: int) -> None:
     names, shares = zip(*_MACHINES, strict=True)
     for _ in range(int(rng.binomial(most, _MACHINE_SHARE))):
         kind = str(rng.choice(names, p=shares))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import shutil
 import tempfile
 from pathlib import Path
@@ -82,8 +83,10 @@ def _remove(trace: Path) -> None:
     try:
         if trace.is_dir() and not trace.is_symlink():
             shutil.rmtree(trace)
-        else:
+        elif trace.is_file() or trace.is_symlink():
             trace.unlink()
+        else:
+            raise OSError(errno.EINVAL, "a pipe or device")
     except OSError as error:
         raise OutputError(
             expected="an earlier run that can be removed",

@@ -17,7 +17,7 @@ from markupsafe import Markup
 from standoff import __version__
 from standoff.core.types import FrameResult, Outcome
 from standoff.files.json_text import plain
-from standoff.files.whole import partial_path
+from standoff.files.whole import partial_file
 from standoff.stages.sinks.collect import HazardLife, RunSummary
 from standoff.stages.sinks.pair_lines import distance_text
 from standoff.stages.sinks.params import ReportParams
@@ -64,9 +64,9 @@ class ReportSink:
             self._summary.take_event(event)
         if self._at_close is not None:
             self._descriptions |= self._at_close()
-        partial = partial_path(self._path)
-        partial.write_text(render(self._summary, outcome, self._descriptions, self._warning_gap_m), encoding="utf-8")
-        partial.replace(self._path)
+        page = render(self._summary, outcome, self._descriptions, self._warning_gap_m)
+        with partial_file(self._path) as partial:
+            partial.write_text(page, encoding="utf-8")
 
 
 def render(summary: RunSummary, outcome: Outcome, descriptions: Mapping[str, Any], warning_gap_m: float) -> str:
