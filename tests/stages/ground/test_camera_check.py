@@ -99,7 +99,7 @@ def test_lenses_that_people_have_are_read_and_straighten_the_edge_of_the_picture
     camera: Camera = load_camera(camera_file(tmp_path, **lens))
     edge_px = np.array([[0.0, 0.0], [1279.0, 719.0], [0.0, 359.5], [639.5, 719.0]])
     straight = camera.undistort(edge_px)
-    described = ~np.isnan(straight).any(axis=1)
+    described = np.isfinite(straight[:, 0])
     assert described[2:].any()
     # Where a polynomial turns back before the corners, that is said.
     assert bool(lens_warnings(CameraPrior.calibrated(camera))) == (not described.all())

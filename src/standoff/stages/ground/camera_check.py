@@ -112,13 +112,27 @@ def _off_axis(prior: CameraPrior) -> list[str]:
 
 
 def check_distortion(camera: Camera, path: Path) -> None:
-    """Refuse coefficients that no lens has: the picture would fold, or its edge be somewhere else altogether.
+    """Refuse coefficients that no lens has.
 
     Raises:
         GroundError: They are such.
     """
-    if not camera.bends:
+    doing = impossible_distortion(camera)
+    if not doing:
         return
+    names = ("k1", "k2", "k3", "k4") if camera.lens == "fisheye" else ("k1", "k2", "p1", "p2", "k3")
+    given = zip(names, camera.distortion.tolist(), strict=True)
+    raise GroundError(
+        expected="distortion coefficients of a lens",
+        found=f"{', '.join(f'{name} {value:g}' for name, value in given if value)} in {path}, by which {doing}",
+        fix="calibrate again with the board in the corners, too, and check the order and model of the coefficients",
+    )
+
+
+def impossible_distortion(camera: Camera) -> str:
+    """Say what no lens does and these coefficients do: fold the picture, or send its edge elsewhere; "" if nothing."""
+    if not camera.bends:
+        return ""
     edge_px, axis_px, focal_px = _edge_px(camera), camera.matrix[:2, 2], np.diag(camera.matrix)[:2]
     seen = np.linalg.norm((edge_px - axis_px) / focal_px, axis=1)
     straight = np.linalg.norm((camera.undistort(edge_px) - axis_px) / focal_px, axis=1)
@@ -129,19 +143,12 @@ def check_distortion(camera: Camera, path: Path) -> None:
     else:
         folds = bool(np.isnan(camera.undistort(axis_px + _DESCRIBED * (edge_px - axis_px))).any())
         strained = bool((times > _SQUEEZED).any() or (times < _STRETCHED).any())
-    if not (folds or strained):
-        return
-    strongest = times[np.argmax(abs(np.log(times)))] if len(times) else np.nan
-    doing = "the picture folds" if folds else f"its edge is {strongest:.2g} times as far off the axis as it looks"
-    names = ("k1", "k2", "k3", "k4") if camera.lens == "fisheye" else ("k1", "k2", "p1", "p2", "k3")
-    stated = ", ".join(
-        f"{name} {value:g}" for name, value in zip(names, camera.distortion.tolist(), strict=True) if value
-    )
-    raise GroundError(
-        expected="distortion coefficients of a lens",
-        found=f"{stated} in {path}, by which {doing}",
-        fix="calibrate again with the board in the corners, too, and check the order and model of the coefficients",
-    )
+    if folds:
+        return "the picture folds"
+    if not strained:
+        return ""
+    strongest = times[np.argmax(abs(np.log(times)))]
+    return f"the edge of the picture is {strongest:.2g} times as far off the axis as it looks"
 
 
 def _edge_px(camera: Camera) -> FloatArray:

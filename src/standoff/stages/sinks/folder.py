@@ -9,7 +9,7 @@ from pathlib import Path
 
 from standoff.core.errors import OutputError
 from standoff.files.in_use import in_use
-from standoff.files.whole import partial_path
+from standoff.files.place import partial_path
 
 OUTPUT_FILES: tuple[str, ...] = (
     "run.json",
