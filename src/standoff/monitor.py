@@ -9,6 +9,7 @@ for result in open_run("site.mp4", "out", load_settings(Path("site.yaml"))):
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ from typing import Any
 from standoff.clips import DETECTIONS_FILE
 from standoff.config import Settings, build_pipeline, build_replacement, build_zones, resolved
 from standoff.core.errors import OutputError
-from standoff.core.types import FrameResult, Sink
+from standoff.core.types import FrameResult, Outcome, Sink
 from standoff.core.zones import Zone
 from standoff.files.in_use import FolderInUse
 from standoff.files.zone_file import write_zones
@@ -133,9 +134,19 @@ def open_run(
     mark = FolderInUse(folder)
     # The record first, so that a folder without room is told before anything else is begun.
     record = RecordSink(folder / RECORD, descriptions, at_close)
-    if zones:
-        write_zones(folder / ZONES, zones)
-    own = build_sinks(settings, folder, descriptions, at_close, checked, zones)
+    try:
+        if zones:
+            write_zones(folder / ZONES, zones)
+        own = build_sinks(settings, folder, descriptions, at_close, checked, zones)
+    except OSError as error:
+        refused = OutputError(
+            expected=f"room for the outputs in {folder}",
+            found=error.strerror or str(error),
+            fix="make room, or choose another folder",
+        )
+        with suppress(OutputError):
+            record.close(Outcome("failed", str(refused)))
+        raise refused from error
     # And closed last, so that it times all others.
     pipeline.sinks = {**own, **extra, "record": record}
     return Run(frames, pipeline, folder, record, mark)

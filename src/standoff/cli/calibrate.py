@@ -47,5 +47,6 @@ def calibrate(
     rows = [(name, f"{rms:.3f}") for name, rms in zip(result.views_used, result.per_view_rms_px, strict=True)]
     rows += [(name, "no board found") for name in result.views_failed]
     rows += [(name, "another size") for name in result.views_of_other_size]
+    rows += [(name, "as another one") for name in result.views_repeated]
     caption = f"{result.rms_px:.3f} px over all views; wrote {out}"
     print_table("Reprojection error", ("view", "rms px"), rows, caption)

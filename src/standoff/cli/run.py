@@ -270,11 +270,8 @@ def tell(ended: Run, *, as_json: bool, quiet: bool) -> None:
 def exit_status(ended: Run) -> int:
     """Return 1 for a run that was interrupted, did not measure much that it saw, or lost an output."""
     from standoff.core.unfollowed import are_many
-    from standoff.monitor import RECORD
 
     record, lost = ended.record, ended.pipeline.sink_errors
-    if "record" in lost:
-        typer.echo(f"standoff: {ended.folder / RECORD} could not be written whole: {lost['record']}", err=True)
     if record["status"] == "interrupted":
         typer.echo("standoff: interrupted; what was written up to then is whole.", err=True)
         return 1

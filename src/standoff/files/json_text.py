@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import re
 from collections.abc import Mapping, Set
-from contextlib import suppress
 from dataclasses import asdict, is_dataclass
 from datetime import date
 from enum import Enum
@@ -18,7 +16,7 @@ import numpy as np
 
 from standoff.core.errors import DataError, OutputError, StandoffError
 from standoff.files.plain_text import read_text
-from standoff.files.whole import partial_path
+from standoff.files.whole import partial_file
 
 
 def plain(value: Any) -> Any:  # noqa: ANN401
@@ -63,21 +61,15 @@ def json_text(value: Any) -> str:  # noqa: ANN401
 
 
 def write_json(path: Path, value: Any) -> None:  # noqa: ANN401
-    """Write an indented JSON file that is, at any moment, either the old one or the new one.
+    """Write an indented JSON file that is, at any moment, either the old one or the new one; or into a pipe or device.
 
     Raises:
         OutputError: It cannot be written.
     """
-    partial = partial_path(path)
     try:
-        with partial.open("w", encoding="utf-8") as file:
-            file.write(json_text(value))
-            file.flush()
-            os.fsync(file.fileno())
-        partial.replace(path)
+        with partial_file(path) as partial:
+            partial.write_text(json_text(value), encoding="utf-8")
     except OSError as error:
-        with suppress(OSError):
-            partial.unlink(missing_ok=True)
         raise OutputError(
             expected=f"to write {path}",
             found=error.strerror or str(error),

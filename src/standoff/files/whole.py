@@ -4,40 +4,61 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Collection, Generator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from standoff.core.errors import OutputError
 from standoff.files.in_use import in_use
+from standoff.files.place import Place, partial_path
 
 
-def partial_path(path: Path) -> Path:
-    """Return the name of a file that is not whole yet; beside the final name, so that a rename is atomic.
+@contextmanager
+def partial_file(out: Path) -> Generator[Path, None, None]:
+    """Give a path to write to; the file takes its place as `out` when all went well, and leaves no trace otherwise.
 
-    >>> partial_path(Path("out/run.json")).name
-    '.run.json.partial'
+    The path is `partial_path` of a plain file, so that whoever owns the folder knows what a killed process left. Links,
+    pipes and devices: see `Place`.
+
+    Raises:
+        OSError: The file cannot be written.
     """
-    return path.with_name(f".{path.name}.partial")
+    place = Place(out)
+    if place.target is None:
+        with TemporaryDirectory() as folder:
+            yield Path(folder) / out.name
+            place.take(Path(folder) / out.name)
+        return
+    partial = partial_path(place.target)
+    try:
+        yield partial
+        place.take(partial)
+    except BaseException:
+        with suppress(OSError):
+            partial.unlink(missing_ok=True)
+        raise
 
 
 @contextmanager
 def whole_file(out: Path) -> Generator[Path, None, None]:
-    """Give a path to write to; the file takes its place as `out` when all went well, and leaves no trace otherwise.
+    """Give a path to write to, of the same name, in a folder of its own; otherwise as `partial_file`.
 
     Raises:
         OutputError: The file cannot be written.
     """
     try:
-        with TemporaryDirectory(dir=out.parent, prefix=".writing-") as folder:
+        place = Place(out)
+        # Beside where it goes, so that it can take its place at once.
+        folder_of_it = None if place.target is None else place.target.parent
+        with TemporaryDirectory(dir=folder_of_it, prefix=".writing-") as folder:
             half_written = Path(folder) / out.name
             yield half_written
-            half_written.replace(out)
+            place.take(half_written)
     except OSError as error:
         raise OutputError(
             expected=f"a place to write {out}",
             found=error.strerror or type(error).__name__,
-            fix="choose a file in an existing folder that you may write to",
+            fix="make room, or choose a file in an existing folder that you may write to",
         ) from error
 
 

@@ -16,7 +16,7 @@ from scipy.ndimage import gaussian_filter
 
 from standoff.core.homography import FloatArray
 from standoff.core.types import ImageArray
-from standoff.files.whole import partial_path
+from standoff.files.place import partial_path
 from standoff.simulation.band_noise import BandNoise
 from standoff.simulation.presets import Condition
 from standoff.stages.sinks.encoder import VideoFile

@@ -97,7 +97,7 @@ def test_without_a_whole_checkpoint_nothing_is_resumed(tmp_path: Path) -> None:
 
 def test_a_checkpoint_that_cannot_be_written_leaves_the_older_ones(tmp_path: Path) -> None:
     save_checkpoint(tmp_path, 1, {"step": 1})
-    (tmp_path / "step-0000002.partial").mkdir()
+    (tmp_path / ".step-0000002.pt.partial").mkdir()
     with pytest.raises(OutputError, match="Make room or give write permission, and go on with --resume"):
         save_checkpoint(tmp_path, 2, {"step": 2})
     assert load_checkpoint(tmp_path) == ({"step": 1}, ())

@@ -32,6 +32,7 @@ from standoff.core.homography import FloatArray
 from standoff.files.json_text import parse_json
 from standoff.files.plain_text import read_text
 from standoff.files.yaml_text import parse_yaml, write_yaml
+from standoff.stages.ground.camera_check import check_axis, check_distortion, check_focal
 from standoff.stages.ground.foreign_cameras import Stated, foreign_reader, missing_size, opencv_xml, opencv_yaml
 from standoff.stages.ground.yaml_file import as_mapping, check_keys, numbers
 
@@ -42,16 +43,6 @@ _DISTORTION: Final[Mapping[Lens, tuple[str, ...]]] = {
     "fisheye": ("k1", "k2", "k3", "k4"),
 }
 _PLAIN_KEYS = ("width_px", "height_px", *_PINHOLE, "matrix", "distortion", "lens", "calibration")
-
-_SHORTEST: Final[Mapping[Lens, float]] = {"brown": 0.2, "fisheye": 0.1}
-"""Focal lengths in longer sides of the picture: no lens that keeps lines straight sees more than 136 degrees; of a
-fisheye's whole circle even a small one in the picture's middle is longer."""
-_LONGEST: Final = 50.0
-"""One that sees a degree: no drone's does."""
-_MOST_OBLONG: Final = 2.0
-"""Of pixels: anamorphic lenses and broadcast pictures stay below."""
-_CENTRAL: Final = 0.1
-"""The lens's axis is no nearer to the picture's edge, as a share of its side: few lie 5 % off the middle."""
 
 
 def load_camera(path: Path | str) -> Camera:
@@ -150,47 +141,15 @@ def _checked_camera(stated: Stated, path: Path) -> Camera:
     if matrix[0, 1] != 0 or matrix[1, 0] != 0 or (matrix[2] != [0, 0, 1]).any():
         expected = "a camera matrix [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] without skew"
         raise GroundError(expected=expected, found=f"{matrix.tolist()} in {path}", fix="correct the file")
-    _check_focal(stated, path)
-    share = (matrix[:2, 2] + 0.5) / stated.size_px
-    if not ((share > _CENTRAL) & (share < 1.0 - _CENTRAL)).all():
-        raise GroundError(
-            expected=f"cx, cy in the middle of the {width_px:g}x{height_px:g} picture",
-            found=f"{matrix[0, 2]:g}, {matrix[1, 2]:g} in {path}",
-            fix="give the size of the pictures that the camera was calibrated on, and cx, cy in pixels",
-        )
+    check_focal(stated.size_px, matrix, stated.lens, path)
+    check_axis(stated.size_px, matrix, path)
     distortion = _all_coefficients(stated, path)
     try:
-        return Camera(int(width_px), int(height_px), matrix, distortion, stated.lens)
+        camera = Camera(int(width_px), int(height_px), matrix, distortion, stated.lens)
     except ValueError as error:
         raise GroundError(expected="a camera", found=f"{path}: {error}", fix="correct the file") from None
-
-
-def _check_focal(stated: Stated, path: Path) -> None:
-    """Refuse focal lengths that are in no pixels of such a picture, and say what they are likely in."""
-    fx, fy = np.diag(stated.matrix)[:2].tolist()
-    if min(fx, fy) <= 0.0:
-        raise GroundError(expected="focal lengths above 0", found=f"{fx:g}, {fy:g} in {path}", fix="correct the file")
-    longer_px = float(stated.size_px.max())
-    for name, focal in (("fx", fx), ("fy", fy)):
-        if not _SHORTEST[stated.lens] <= focal / longer_px <= _LONGEST:
-            raise GroundError(
-                expected=f"{name} in pixels, of which the picture is {longer_px:g} long",
-                found=f"{focal:g} in {path}, {_likely_unit(focal, longer_px)}",
-                fix="multiply millimetres by the picture's width in pixels and divide by the sensor's in millimetres",
-            )
-    if not 1.0 / _MOST_OBLONG < fx / fy < _MOST_OBLONG:
-        found = f"{fx:g} and {fy:g} in {path}"
-        raise GroundError(expected="fx and fy of about square pixels", found=found, fix="correct the file")
-
-
-def _likely_unit(focal: float, longer_px: float) -> str:
-    if focal > longer_px:
-        return "likely of a far larger picture"
-    if focal < 0.3:
-        return "likely in metres"
-    if focal < 3.0:
-        return "likely a share of the picture's width"
-    return "likely in millimetres" if focal < 200.0 else "likely of a smaller picture"
+    check_distortion(camera, path)
+    return camera
 
 
 def _all_coefficients(stated: Stated, path: Path) -> FloatArray:

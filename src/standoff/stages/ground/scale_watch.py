@@ -13,6 +13,7 @@ from standoff.core.classes import Role, class_ids
 from standoff.core.errors import GroundError
 from standoff.core.protocols import AnyGround, AnyMotion, Ground
 from standoff.core.types import Detections, Frame, GroundMap, NoGroundMap
+from standoff.stages.ground.camera_check import lens_warnings
 from standoff.stages.ground.size_scale import REFUSAL_FACTOR, WARNING_FACTOR, size_ratios, unit_hint
 
 _EVERY_S = 0.5
@@ -83,9 +84,9 @@ class ScaleWatch:
 
     @property
     def description(self) -> dict[str, Any]:
-        """The inner stage's, and what sizes say of its metres."""
+        """The inner stage's, and what is odd about its lens and, by the sizes of what is seen, about its metres."""
         inner = dict(getattr(self.inner, "description", {}))
-        inner["warnings"] = [*inner.get("warnings", ()), *self._warnings()]
+        inner["warnings"] = [*lens_warnings(self._camera), *inner.get("warnings", ()), *self._warnings()]
         seen = {name: len(sizes.logs) for name, sizes in self._sizes.items() if sizes.logs}
         ratios = {name: float(np.exp(np.median(sizes.logs))) for name, sizes in self._sizes.items() if sizes.logs}
         return {**inner, "scale_watch": {"sizes_seen": seen, "times_too_large": ratios}}

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+from contextlib import suppress
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -13,7 +15,7 @@ from av.video.reformatter import ColorRange, Colorspace, VideoReformatter
 
 from standoff.core.errors import MissingDependency
 from standoff.core.types import ImageArray
-from standoff.files.whole import partial_path
+from standoff.files.whole import partial_file
 
 _TIME_BASE = Fraction(1, 60_000)  # frames of 23.976 to 60 Hz last whole ticks; MPEG-4 Part 2 takes at most 65535
 _KEYFRAME_EVERY_S = 2.0
@@ -66,6 +68,7 @@ class VideoFile:
             self._stream.options = {"crf": str(crf), "preset": preset}
         else:
             self._stream.bit_rate = int(size_px[0] * size_px[1] * _NOMINAL_FPS * 0.1)
+        self._is_broken = False
         self._last_ticks = -1
         self._keyframe_ticks: int | None = None
 
@@ -75,6 +78,9 @@ class VideoFile:
         Args:
             picture: (height, width, 3) uint8 BGR of the file's size.
             time_s: When it is shown, from the start of the file; moved on by one tick where it does not increase.
+
+        Raises:
+            OSError: It cannot be written; nor can any later one.
         """
         ticks = max(round(time_s / _TIME_BASE), self._last_ticks + 1)
         frame = self._coded(picture)
@@ -84,7 +90,15 @@ class VideoFile:
             frame.pict_type = av.video.frame.PictureType.I
             self._keyframe_ticks = ticks
         self._last_ticks = ticks
+        self._mux(frame)
+
+    def _mux(self, frame: av.VideoFrame | None) -> None:
+        # After a header that found no room libav would write it once more, and dies of that.
+        if self._is_broken:
+            raise OSError(errno.EIO, "an earlier picture could not be written", str(self._path))
+        self._is_broken = True
         self._container.mux(self._stream.encode(frame))
+        self._is_broken = False
 
     def _coded(self, picture: ImageArray) -> av.VideoFrame:
         if self._reformatter is None:
@@ -98,19 +112,34 @@ class VideoFile:
         )
 
     def close(self) -> None:
-        """Finish the file."""
-        self._container.mux(self._stream.encode(None))
-        self._container.close()
-        partial = partial_path(self._path)
+        """Finish the file; after a picture that could not be written, keep it as it is, if it can be played at all.
+
+        Raises:
+            OSError: It cannot be written, or not rewritten; then what was written so far stays.
+        """
+        if self._is_broken:
+            self._leave()
+            return
         try:
+            self._mux(None)
+            self._container.close()
+        except BaseException:
+            self._leave()
+            raise
+        with partial_file(self._path) as partial:
             _rewrite(self._path, partial)
-            partial.replace(self._path)
-        finally:
-            partial.unlink(missing_ok=True)
+
+    def _leave(self) -> None:
+        with suppress(OSError):
+            self._container.close()
+        if not _can_be_played(self._path):
+            with suppress(OSError):
+                self._path.unlink(missing_ok=True)
 
     def discard(self) -> None:
         """Stop and remove the file."""
-        self._container.close()
+        with suppress(OSError):
+            self._container.close()
         self._path.unlink(missing_ok=True)
 
 
@@ -137,6 +166,14 @@ def available_encoder() -> str:
         found="none of them in this build of PyAV",
         fix="install PyAV from its wheel (pip install --force-reinstall av) or switch the annotated video off",
     )
+
+
+def _can_be_played(path: Path) -> bool:
+    try:
+        with av.open(str(path)) as container:
+            return next(container.decode(video=0), None) is not None
+    except (OSError, av.error.FFmpegError):
+        return False
 
 
 def _rewrite(fragmented: Path, whole: Path) -> None:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import errno
 import shutil
 import tempfile
 from pathlib import Path
 
 from standoff.core.errors import OutputError
 from standoff.files.in_use import in_use
-from standoff.files.whole import partial_path
+from standoff.files.place import partial_path
 
 OUTPUT_FILES: tuple[str, ...] = (
     "run.json",
@@ -83,8 +84,10 @@ def _remove(trace: Path) -> None:
     try:
         if trace.is_dir() and not trace.is_symlink():
             shutil.rmtree(trace)
-        else:
+        elif trace.is_file() or trace.is_symlink():
             trace.unlink()
+        else:
+            raise OSError(errno.EINVAL, "a pipe or device")
     except OSError as error:
         raise OutputError(
             expected="an earlier run that can be removed",

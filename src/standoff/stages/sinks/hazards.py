@@ -49,5 +49,7 @@ class HazardSink:
 
     def close(self, outcome: Outcome) -> None:
         """Append what the end of the stream closed."""
-        self._append(outcome.hazards)
-        self._file.close()
+        try:
+            self._append(outcome.hazards)
+        finally:
+            self._file.close()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import os
 import shutil
 import time
 from collections.abc import Mapping, Sequence
@@ -15,7 +14,7 @@ import numpy.typing as npt
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from standoff.files.whole import partial_path
+from standoff.files.whole import partial_file
 from standoff.stages.sinks.folder import parts_folder
 
 Column = npt.NDArray[Any] | Sequence[Any]
@@ -64,9 +63,8 @@ class ParquetParts:
         self._is_whole = False
         columns = [_joined([chunk[field.name] for chunk in self._chunks], field.type) for field in self._schema]
         part = self._folder / f"part-{len(self._parts):06d}.parquet"
-        partial = partial_path(part)
-        pq.write_table(pa.Table.from_arrays(columns, schema=self._schema), partial)
-        partial.replace(part)
+        with partial_file(part) as partial:
+            pq.write_table(pa.Table.from_arrays(columns, schema=self._schema), partial)
         self._parts.append(part)
         self._is_whole = True
         self._chunks, self._rows = [], 0
@@ -79,8 +77,7 @@ class ParquetParts:
         if not self._is_whole:
             return
         self._flush()
-        partial = partial_path(self._path)
-        with pq.ParquetWriter(partial, self._schema) as writer:
+        with partial_file(self._path) as partial, pq.ParquetWriter(partial, self._schema) as writer:
             gathered: list[pa.Table] = []
             for part in self._parts:
                 gathered.append(pq.read_table(part, schema=self._schema))
@@ -89,9 +86,6 @@ class ParquetParts:
                     gathered = []
             if gathered:
                 writer.write_table(pa.concat_tables(gathered))
-        with partial.open("rb") as file:
-            os.fsync(file.fileno())
-        partial.replace(self._path)
         shutil.rmtree(self._folder)
 
 

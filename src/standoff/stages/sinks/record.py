@@ -139,11 +139,15 @@ class RecordSink:
             OutputError: The whole record could not be written.
         """
         self._count_hazards(outcome.hazards)
+        status, message = outcome.status, outcome.message
+        if outcome.sink_errors and status == "complete":
+            # Whoever looks for "complete" relies on every file of the folder.
+            status, message = "failed", f"not whole: {', '.join(outcome.sink_errors)} (see sink_errors)"
         wall_s = time.monotonic() - self._started
         self.record = plain(
             {
-                "status": outcome.status,
-                "message": outcome.message,
+                "status": status,
+                "message": message,
                 **self._head,
                 **(self._at_close() if self._at_close is not None else {}),
                 "finished_at": datetime.now(UTC),
@@ -158,14 +162,16 @@ class RecordSink:
                     "invalid_positions": self._invalid,
                 },
                 "stages": {stage: durations.summary() for stage, durations in self._stages.items()},
-                "sink_errors": outcome.sink_errors,
+                "sink_errors": dict(outcome.sink_errors),
             }
         )
         try:
             write_json(self._path, self.record)
         except OutputError as error:
-            message = f"{outcome.message or 'the run came to its end'}; this record is not whole: {error.found}"
-            _write_over(self._path, {"status": "failed", "message": message, "sink_errors": outcome.sink_errors})
+            message = f"{message or 'the run came to its end'}; this record is not whole: {error.found}"
+            lost = {**outcome.sink_errors, "record": str(error)}
+            self.record |= {"status": "failed", "message": message, "sink_errors": lost}
+            _write_over(self._path, {name: self.record[name] for name in ("status", "message", "sink_errors")})
             raise
 
 

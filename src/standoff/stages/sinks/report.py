@@ -18,7 +18,7 @@ from standoff import __version__
 from standoff.core.types import FrameResult, Outcome
 from standoff.core.zones import NOT_PLACED, ZONE_WORDS, Zone
 from standoff.files.json_text import plain
-from standoff.files.whole import partial_path
+from standoff.files.whole import partial_file
 from standoff.stages.sinks.collect import HazardLife, RunSummary
 from standoff.stages.sinks.pair_lines import distance_text
 from standoff.stages.sinks.params import ReportParams
@@ -72,11 +72,10 @@ class ReportSink:
             self._summary.take_event(event)
         if self._at_close is not None:
             self._descriptions |= self._at_close()
-        partial = partial_path(self._path)
         checked = "" if self._checked is None else self._checked()
         page = render(self._summary, outcome, self._descriptions, self._warning_gap_m, checked)
-        partial.write_text(page, encoding="utf-8")
-        partial.replace(self._path)
+        with partial_file(self._path) as partial:
+            partial.write_text(page, encoding="utf-8")
 
 
 def render(

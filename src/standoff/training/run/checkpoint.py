@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pickle
 import zipfile
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import torch
 
 from standoff.core.errors import DataError, OutputError
+from standoff.files.whole import partial_file
 
 _KEPT = 2
 """The last good one must still be there when the newest was cut short."""
@@ -29,15 +29,12 @@ def save_checkpoint(folder: Path, step: int, state: dict[str, Any]) -> None:
         OutputError: It cannot be written; the older ones are still there.
     """
     path = folder / f"step-{step:07d}.pt"
-    partial = path.with_suffix(".partial")
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        torch.save(state, partial)
-        partial.replace(path)
+        with partial_file(path) as partial:
+            torch.save(state, partial)
     # torch's own writer raises RuntimeError where the disk is full.
     except (OSError, RuntimeError) as error:
-        with suppress(OSError):
-            partial.unlink(missing_ok=True)
         raise OutputError(
             expected=f"to write the checkpoint {path}",
             found=str(error).splitlines()[0],
