@@ -51,6 +51,9 @@ SWSCALE_LEVELS = 5
 CALIBRATED_FOCAL_REL = 1e-3
 """cv2.calibrateCamera on exact corners stored as float32; its iterations stop early along the distortion's valley."""
 
+SOLVED_TWICE_REL = 1e-5
+"""The same views given to cv2.calibrateCamera in two ways: its threads add up in any order, and it stops early."""
+
 BOARD_CORNER_PX = 0.02
 """cornerSubPix on an axis-aligned drawn board: symmetric edges half-way between two pixel centres."""
 
