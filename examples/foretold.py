@@ -18,13 +18,12 @@ import json
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from standoff.core.classes import CLASSES, Role
-from standoff.core.homography import FloatArray
-from standoff.core.types import GroundMap, IntArray, Proximities, Tracks
+from standoff.core.homography import BoolArray, FloatArray
+from standoff.core.types import GroundMap, Hazard, IntArray, Proximities, Tracks
 from standoff.simulation.casting import CASTS, Stage
 from standoff.simulation.motion import sample
 from standoff.simulation.people.anthropometry import MEAN_STATURE_M
@@ -66,9 +65,8 @@ class Score:
 
     Attributes:
         lead_s: Of each breach: how long before it a hazard was open; negative: after; NaN: never.
-        warnings: How many were said.
+        warnings: How many hazards were opened.
         false: How many of them in vain.
-        alarms: How many hazards were opened, true or not.
     """
 
     lead_s: list[float] = field(default_factory=list)
@@ -76,6 +74,7 @@ class Score:
     false: int = 0
 
     def row(self, hours: float, worker_hours: float) -> dict[str, float]:
+        """Return the figures of one line of the table."""
         lead = np.array(self.lead_s)
         return {
             "breaches": len(lead),
@@ -90,6 +89,7 @@ class Score:
 
 
 def work(seed: int) -> Shift:
+    """Let a cast work."""
     rng = np.random.default_rng(seed)
     cast = CASTS[("busy", "mobile")[seed % 2]](rng, Stage(0.0, 1.0, CLIP_S, None, None, MEAN_STATURE_M))
     times_s = np.arange(0.0, CLIP_S, STEP_S)
@@ -98,6 +98,7 @@ def work(seed: int) -> Shift:
 
 
 def seen(shift: Shift, rng: np.random.Generator, error: float) -> Iterator[Tracks]:
+    """Give what a camera would tell of each frame."""
     names = [CLASSES[i].name for i in shift.class_id]
     changing_m = error * np.array([CHANGING_M.get(name, OTHER_MACHINE_M[0]) for name in names])
     lasting_m = error * np.array([LASTING_M.get(name, OTHER_MACHINE_M[1]) for name in names])
@@ -147,7 +148,7 @@ def run(shift: Shift, rng: np.random.Generator, error: float) -> dict[float, dic
     return spans
 
 
-def _follow(event: Any, open_at: dict[str, tuple[Pair, float]], spans: dict[Pair, list[Span]]) -> None:
+def _follow(event: Hazard, open_at: dict[str, tuple[Pair, float]], spans: dict[Pair, list[Span]]) -> None:
     if event.rule != "proximity" or event.severity == "unknown":
         return
     if event.phase == "closed":
@@ -180,7 +181,7 @@ def true_breaches(shift: Shift) -> dict[Pair, list[Span]]:
     return breaches
 
 
-def _truly_excused(shift: Shift) -> dict[Pair, Any]:
+def _truly_excused(shift: Shift) -> dict[Pair, BoolArray]:
     """Return (T,) for each pair when the product's own rules, told the truth, call it no hazard."""
     exact = Locator()
     matrix = np.diag([1 / PX_PER_M, 1 / PX_PER_M, 1.0])
@@ -204,6 +205,7 @@ def _truly_excused(shift: Shift) -> dict[Pair, Any]:
 
 
 def score(spans: dict[Pair, list[Span]], breaches: dict[Pair, list[Span]], into: Score) -> None:
+    """Compare what was said with what happened."""
     for pair, hazards in spans.items():
         into.warnings += len(hazards)
         true = breaches.get(pair, [])
@@ -221,6 +223,7 @@ def score(spans: dict[Pair, list[Span]], breaches: dict[Pair, list[Span]], into:
 
 
 def main() -> None:
+    """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--hours", type=float, default=20.0)
     parser.add_argument("--seed", type=int, default=0)
