@@ -29,7 +29,7 @@ from standoff.core.camera import Camera
 from standoff.core.errors import GroundError
 from standoff.core.homography import FloatArray
 from standoff.stages.ground.camera_file import load_camera
-from standoff.stages.ground.geographic import east_north_m, look_like_degrees
+from standoff.stages.ground.geographic import east_north_m, likely_unit
 from standoff.stages.ground.surveyed import SurveyedGround
 from standoff.stages.ground.yaml_file import check_keys, numbers, read_mapping
 
@@ -88,12 +88,13 @@ def _points_m(points: Mapping[str, Mapping[str, Any]], path: Path) -> FloatArray
             found = f"{places[outside][0].tolist()} in {path}"
             raise GroundError(expected="degrees [longitude, latitude]", found=found, fix="correct lonlat")
         return east_north_m(places) if len(places) else places
-    if len(places) > 1 and look_like_degrees(places):
-        span_m = np.ptp(places, axis=0).max()
+    if unit := likely_unit(places):
+        span_m = float(np.ptp(places, axis=0).max())
+        size = f"{span_m:.2g} m" if span_m < 1.0 else f"{span_m:.0f} m, up to {np.abs(places).max():.0f} m off zero"
         raise GroundError(
             expected="m in metres",
-            found=f"points that all lie within {span_m:.2g} m in {path}, probably degrees of longitude and latitude",
-            fix="write lonlat: [longitude, latitude] in place of m",
+            found=f"points that all lie within {size} in {path}, probably {unit}",
+            fix="write metres, or lonlat: [longitude, latitude] in degrees in place of m",
         )
     return places
 
