@@ -251,6 +251,14 @@ def test_a_reference_without_a_box_needs_a_model_that_knows_it() -> None:
         ("STANDOFF_DETECT_EVRY", "STANDOFF_DETECT_EVERY"),
         ("STANDOFF_TRAK__MAX_COAST_S", "STANDOFF_TRACK__MAX_COAST_S"),
         ("STANDOFF_MODELL", "STANDOFF_MODEL"),
+        ("standoff_modell", "STANDOFF_MODEL"),
+        ("STANDOF_EVERY", "STANDOFF_EVERY"),
+        ("STANDOFFEVERY", "STANDOFF_EVERY"),
+        ("StandOff_Evry", "STANDOFF_EVERY"),
+        ("STANDOFF_DETECTEVERY", "STANDOFF_DETECT_EVERY"),
+        ("STANDOFF_TRACK_MAX_COAST_S", "STANDOFF_TRACK__MAX_COAST_S"),
+        ("STNADOFF_TRACK__MAX_COAST_S", "STANDOFF_TRACK__MAX_COAST_S"),
+        ("STANDOFF_CONFIG", "--config"),
     ],
 )
 def test_a_misspelt_variable_is_refused_with_the_nearest_name(
@@ -260,6 +268,27 @@ def test_a_misspelt_variable_is_refused_with_the_nearest_name(
     with pytest.raises(ConfigError) as caught:
         load_settings()
     assert f"found {variable}." in str(caught.value) and nearest in str(caught.value)
+
+
+def test_a_variable_that_is_like_no_setting_is_refused_without_a_guess(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("STANDOFF_CONFIG", "site.yaml")
+    with pytest.raises(ConfigError) as caught:
+        load_settings()
+    assert "STANDOFF_FPS" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "variable", ["STAN_NUM_THREADS", "EVERY", "MODEL", "STANDBY_EVERY", "HANDOFF_EVERY", "OFFEVERY"]
+)
+def test_variables_of_other_programs_are_theirs(monkeypatch: pytest.MonkeyPatch, variable: str) -> None:
+    monkeypatch.setenv(variable, "4")
+    assert load_settings().every == 1
+
+
+@pytest.mark.parametrize("variable", ["standoff_every", "STANDOFF_EVERY"])
+def test_variables_are_read_in_any_case(monkeypatch: pytest.MonkeyPatch, variable: str) -> None:
+    monkeypatch.setenv(variable, "4")
+    assert load_settings().every == 4
 
 
 def test_a_settings_file_with_a_name_twice_is_refused_with_both_lines(tmp_path: Path) -> None:

@@ -23,7 +23,7 @@ from standoff.files.in_use import FolderInUse
 from standoff.files.zone_file import write_zones
 from standoff.pipeline import Pipeline
 from standoff.stages.detect import RecordedDetector
-from standoff.stages.frames import Source, open_source
+from standoff.stages.frames import Source, local_path, open_source
 from standoff.stages.sinks import (
     FRAMES,
     OUTPUT_FILES,
@@ -90,7 +90,7 @@ def open_run(
     """Open the source, build the pipeline, then prepare the folder: nothing is written if anything is wrong.
 
     Args:
-        source: Video file or folder of pictures.
+        source: Video file or folder of pictures, or its `file:` address.
         out: Output folder; created.
         settings: What to run.
         overwrite: Replace the files of an earlier run in the folder.
@@ -99,7 +99,7 @@ def open_run(
     Raises:
         StandoffError: A source, model, survey, camera, setting or folder that cannot be used.
     """
-    _refuse_to_replace(Path(source).resolve(), Path(out).resolve(), "the source")
+    _refuse_to_replace(local_path(source).resolve(), Path(out).resolve(), "the source")
     if settings.detections is not None:
         _refuse_to_replace(settings.detections.resolve(), Path(out).resolve(), "the recorded detections")
     if settings.zones is not None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import copy
 import os
-from collections.abc import Mapping
-from difflib import get_close_matches
+from collections.abc import Iterator, Mapping
+from difflib import SequenceMatcher, get_close_matches
 from pathlib import Path
 from typing import Any, Final
 
@@ -27,6 +27,8 @@ def _clause(error: ErrorDetails) -> str:
     return f"{where}: {message}{found}" if where else message
 
 
+_ALIKE: Final = 0.85
+"""Share of letters that two names have in common, in order, where one is likely the other, mistyped."""
 _ADVICE: Final = "correct them; `standoff config show` lists every setting with its meaning and bounds"
 
 
@@ -77,16 +79,46 @@ def _anchor_paths(settings: dict[str, Any], folder: Path) -> None:
 def _check_environment() -> None:
     """Raise ConfigError for a variable that looks like a setting and is none: it would be passed over."""
     prefix = str(Settings.model_config.get("env_prefix", ""))
-    known = [f"{prefix}{name.upper()}" for name in Settings.model_fields]
+    sections = [f"{prefix}{name.upper()}" for name in Settings.model_fields]
     for variable in os.environ:
-        section = variable.upper().partition("__")[0]
-        if section.startswith(prefix) and section not in known:
-            nearest = get_close_matches(section, known, n=1, cutoff=0.0)[0]
+        named = variable.upper()
+        if named.partition("__")[0] in sections:
+            continue
+        nearest = _nearest_variable(named, prefix)
+        if named.startswith(prefix) or (nearest and _begins_like(named, prefix)):
+            meant = f", or write {nearest} if that is what is meant" if nearest else ""
+            file = "; a settings file is named with --config" if _letters(named) == _letters(f"{prefix}config") else ""
             raise ConfigError(
                 expected=f"settings in variables that begin with {prefix}",
                 found=variable,
-                fix=f"unset it, or write {nearest}{variable[len(section) :]} if that is what is meant",
+                fix=f"unset it{meant}{file}; `standoff config show` lists every setting",
             )
+
+
+def _nearest_variable(named: str, prefix: str) -> str:
+    """Return the variable of a setting whose letters are nearly those of another one; "" if there is none."""
+    known = {_letters(name): name for name in _variables(resolved(Settings.model_construct()), prefix)}
+    near = get_close_matches(_letters(named), known, n=1, cutoff=_ALIKE)
+    return known[near[0]] if near else ""
+
+
+def _variables(settings: Mapping[str, Any], prefix: str) -> Iterator[str]:
+    """Yield the names of variables, those of sections too."""
+    for name, value in settings.items():
+        variable = f"{prefix}{name.upper()}"
+        yield variable
+        if isinstance(value, Mapping):
+            yield from _variables(value, f"{variable}__")
+
+
+def _letters(name: str) -> str:
+    return name.upper().replace("_", "")
+
+
+def _begins_like(named: str, prefix: str) -> bool:
+    """Tell a program's own prefix, mistyped, from another program's: most of it must be there."""
+    own = _letters(prefix)
+    return SequenceMatcher(None, _letters(named)[: len(own)], own).ratio() >= _ALIKE
 
 
 def load_settings(path: Path | str | None = None, overrides: Mapping[str, Any] | None = None) -> Settings:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Self
+from typing import Final, Self
 
 import numpy as np
 
@@ -12,8 +12,15 @@ from standoff.core.homography import FloatArray
 _SEMI_MAJOR_M = 6378137.0
 _ECCENTRICITY_2 = 0.00669437999014
 
-_SITE_SPAN_DEG = 0.05
-"""Five kilometres; as metres, five centimetres, which is no site."""
+DEGREES: Final = "degrees of longitude and latitude"
+_SITE_SPAN: Final = 0.05
+"""Five kilometres in degrees, fifty metres in kilometres; as metres, five centimetres, which is no site."""
+_LOCAL_KM: Final = 1.0
+"""Kilometres of one site are counted from somewhere near it; a degree off both the equator and Greenwich is sea."""
+_SHORTEST_KM: Final = 0.003
+"""In degrees, 300 m."""
+_FARTHEST_M: Final = 2.1e7
+"""Half around the earth: no projection's coordinates are larger."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,10 +80,22 @@ def east_north_m(lonlat_deg: FloatArray) -> FloatArray:
     return GeographicOrigin.of(lonlat_deg).to_metres(lonlat_deg)
 
 
-def look_like_degrees(points_m: FloatArray) -> bool:
-    """Tell whether coordinates (N, 2) that are said to be metres are more likely degrees.
+def likely_unit(places: FloatArray) -> str:
+    """Tell in what coordinates (N, 2) that are said to be metres more likely are; "" where they can be metres.
 
-    >>> look_like_degrees(np.array([[8.5, 50.1], [8.5002, 50.1001]])), look_like_degrees(np.array([[0.0, 0], [9, 4]]))
-    (True, False)
+    >>> likely_unit(np.array([[8.5, 50.1], [8.5002, 50.1001]])), likely_unit(np.array([[0.0, 0], [9, 4]]))
+    ('degrees of longitude and latitude', '')
+    >>> likely_unit(np.array([[0.0, 0.0], [0.03, 0.02]]))
+    'kilometres'
     """
-    return bool((np.ptp(points_m, axis=0) < _SITE_SPAN_DEG).all() and (np.abs(points_m) <= 180.0).all())
+    if len(places) < 2:
+        return ""
+    largest = np.abs(places).max(axis=0)
+    span = float(np.ptp(places, axis=0).max())
+    if span < _SITE_SPAN:
+        are_km = (largest < _LOCAL_KM).all() and span > _SHORTEST_KM
+        return "kilometres" if are_km or (largest > 180.0).any() else DEGREES
+    if largest.max() > _FARTHEST_M:
+        # A kilometre is 90 000 of the one, 100 000 of the other.
+        return "degrees times 10^7, or centimetres of a map" if largest.max() <= 1.8e9 else "millimetres of a map"
+    return ""

@@ -19,7 +19,7 @@ from typing import Any, Final
 import numpy as np
 
 from standoff.core.errors import ConfigError
-from standoff.core.geographic import GeographicOrigin, look_like_degrees
+from standoff.core.geographic import DEGREES, GeographicOrigin, likely_unit
 from standoff.core.homography import FloatArray
 from standoff.core.zones import ZONE_KINDS, Ring, Zone
 from standoff.files.json_text import read_json, write_json
@@ -153,7 +153,7 @@ def _is_in_degrees(
 ) -> bool:
     """Tell whether the file is in degrees; refuse what cannot be told, or turned into metres."""
     stated = _stated_degrees(content.get("crs"), path)
-    if not stated and not all(look_like_degrees(corners) for corners in drawn):
+    if not stated and not all(likely_unit(corners) == DEGREES for corners in drawn):
         return False
     corners = np.concatenate(drawn)
     if (np.abs(corners) > np.array([180.0, 90.0])).any():

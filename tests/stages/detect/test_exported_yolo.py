@@ -67,6 +67,22 @@ def test_columns_of_boxes_and_probabilities_are_read(
     assert bool(description["warnings"]) == (unit == "parts")
 
 
+@pytest.mark.parametrize("task", MORE)
+@pytest.mark.parametrize("size_px", SIZES)
+@pytest.mark.parametrize("unit", ["pixels", "parts"])
+def test_a_table_that_was_turned_over_is_read_as_the_columns_that_it_was(
+    tmp_path: Path, task: str, size_px: tuple[int, int], unit: str
+) -> None:
+    random = np.random.default_rng(1)
+    cells = size_px[0] * size_px[1] * 21 // 1024
+    boxes, chances = random_boxes(random, cells, size_px), random_chances(random, cells)
+    scale = np.tile(size_px, 2) if unit == "parts" else 1
+    rows = np.concatenate([boxes / scale, chances, np.zeros((cells, MORE[task]))], axis=1)
+    model = save_exported(tmp_path / "m.onnx", rows[None], size_px, task)
+    _same(_found(model, size_px), boxes, chances)
+    assert OnnxDetector(model).description["family"] == "yolov8"
+
+
 @pytest.mark.parametrize("task", ["detect", "segment"])
 @pytest.mark.parametrize("size_px", SIZES)
 @pytest.mark.parametrize("unit", ["pixels", "parts"])

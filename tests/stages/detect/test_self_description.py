@@ -35,6 +35,7 @@ from standoff.stages.detect.self_description import SelfDescription
     [
         ("['person', 'car', 'kite']", NAMES),
         ("{2: 'kite', 0: 'person', 1: 'car'}", NAMES),
+        ('{"0": "person", "1": "car", "2": "kite"}', NAMES),
         ("\ufeff{0: '\ufeffperson', 1: ' car', 2: 'kite'}", NAMES),
     ],
 )
@@ -48,6 +49,8 @@ def test_names_are_read_in_any_form(names: str, classes: tuple[str, ...]) -> Non
     ("texts", "message"),
     [
         ({"names": "{0: 'a', 2: 'b'}"}, "ids other than 0 to 1 in names"),
+        ({"names": "{0: 'a', '0': 'b'}"}, "ids other than 0 to 1 in names"),
+        ({"names": "{'a': 0}"}, "ids other than 0 to 0 in names"),
         ({"names": "{}"}, "names that are neither a list nor ids with names"),
         ({"names": "(((("}, r"found '\(\(\(\('"),
         ({"names": "__import__('os')"}, "found '__import__"),

@@ -123,15 +123,17 @@ def test_of_several_films_the_main_one_is_read_and_the_others_are_named(
         assert "stream {} is read, not {} ({}x{})".format(chosen, 1 - chosen, *sizes[1 - chosen]) in source.warnings[0]
 
 
-def rewrapped(path: Path, out: Path, times_s: Sequence[float]) -> Path:
-    """Copy a film without B-frames, with other times."""
+def rewrapped(path: Path, out: Path, times_s: Sequence[float], *, rising: bool = True) -> Path:
+    """Copy a film without B-frames, with other times, of which Matroska takes any, rising or not."""
     with av.open(str(path)) as source, av.open(str(out), "w") as target:
         stream = target.add_stream_from_template(source.streams.video[0])
         packets = [packet for packet in source.demux(video=0) if packet.dts is not None]
         tick = Fraction(1, 90_000)
-        for packet, time_s in zip(packets, times_s, strict=True):
+        for index, (packet, time_s) in enumerate(zip(packets, times_s, strict=True)):
             packet.time_base = tick
             packet.pts = packet.dts = round(Fraction(time_s) / tick)
+            if not rising:
+                packet.dts = index - len(packets)
             packet.duration = 0
             packet.stream = stream
             target.mux_one(packet)
@@ -168,6 +170,57 @@ def test_a_time_before_the_last_costs_one_frame(late_s: float) -> None:
     assert [index for index, time_s in enumerate(times_s) if not times.passes(time_s, f"frame {index}")] == [9]
     assert times.skipped == 1
     assert "at frame 9" in times.warnings[0]
+
+
+def shown_by(times_s: list[float]) -> tuple[list[int], RisingTimes]:
+    times = RisingTimes("film.mp4")
+    labelled = [(time_s, f"frame {index}", index) for index, time_s in enumerate(times_s)]
+    return [index for _, index in times.in_order(labelled)], times
+
+
+@pytest.mark.parametrize("where", [0, 1, 4, 8, 9])
+@pytest.mark.parametrize("wrong_s", [30.0, 0.95, 0.0, -7.0])
+def test_one_wrong_time_costs_one_frame_wherever_it_is(where: int, wrong_s: float) -> None:
+    times_s = [index / 10 for index in range(10)]
+    times_s[where] = wrong_s
+    if sorted(times_s) == times_s and len(set(times_s)) == len(times_s):
+        pytest.skip("a gap, or a later end, as films have")
+    passed, times = shown_by(times_s)
+    # Of two last frames, and of two of which the earlier is a bit late, nobody can say which is wrong.
+    assert len(passed) == 9
+    if where not in (8, 9) and not (where == 1 and wrong_s == 0.0):
+        assert passed == [index for index in range(10) if index != where]
+        assert f"at frame {where}" in times.warnings[0]
+
+
+def test_a_clock_that_begins_anew_is_named() -> None:
+    with pytest.raises(SourceError, match=r"0\.000 s after 0\.900 s at frame 10 of film\.mp4, and on from there"):
+        shown_by([index / 10 for index in range(10)] * 2)
+    _, times = shown_by([0.0, 0.1, 0.2, 0.3, 0.0, 0.1, 0.2])
+    with pytest.raises(SourceError, match="at frame 4"):
+        times.check_end()
+    _, times = shown_by([0.0, 0.1, 0.2, 0.3, 0.0])
+    times.check_end()
+
+
+@pytest.mark.parametrize(("start_s", "expected"), [(0.0, list(range(1, 20))), (0.85, list(range(10, 20)))])
+def test_a_wrong_first_time_costs_the_first_frame(
+    tmp_path: Path, plain_film: Path, start_s: float, expected: list[int]
+) -> None:
+    times_s = [1.05, *(index / 10 for index in range(1, 20))]
+    path = rewrapped(plain_film, tmp_path / "late.mkv", times_s, rising=False)
+    with open_source(path, start_s=start_s) as source:
+        frames = list(source)
+        assert any("1 frame is skipped" in warning and "at frame 0" in warning for warning in source.warnings)
+    assert [frame.index for frame in frames] == [index_in(frame.image) for frame in frames] == expected
+    assert [frame.time_s for frame in frames] == pytest.approx([index / 10 - 0.1 for index in expected], abs=1e-4)
+
+
+def test_a_film_whose_clock_begins_anew_is_refused_by_that(tmp_path: Path, plain_film: Path) -> None:
+    times_s = [index % 16 / 10 for index in range(20)]
+    path = rewrapped(plain_film, tmp_path / "anew.mkv", times_s, rising=False)
+    with open_source(path) as source, pytest.raises(SourceError, match=r"0\.000 s after 1\.500 s at frame 16"):
+        list(source)
 
 
 def test_a_film_with_every_frame_twice_has_each_once() -> None:

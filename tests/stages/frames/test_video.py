@@ -197,6 +197,17 @@ def test_files_that_are_no_videos_are_named_in_one_line(tmp_path: Path) -> None:
         assert name in str(caught.value)
 
 
+def test_the_address_of_a_file_is_that_file(tmp_path: Path) -> None:
+    path = write_video(tmp_path / "site 1.mp4", 3, Recipe())
+    for address in (path.as_uri(), path.as_uri().replace("///", "/"), path.as_uri().replace("///", "//localhost/")):
+        with open_source(address) as source:
+            assert (len(list(source)), source.stream_id) == (3, "site 1")
+        # As the command line gives it.
+        open_source(Path(address)).close()
+    with pytest.raises(SourceError, match=r"nothing at /.*missing\.mp4"):
+        open_source((tmp_path / "missing.mp4").as_uri())
+
+
 def test_a_sound_file_is_no_video(tmp_path: Path) -> None:
     path = tmp_path / "sound.wav"
     with av.open(str(path), "w") as container:

@@ -90,6 +90,28 @@ def test_degrees_that_are_said_to_be_metres_are_refused(tmp_path: Path, offset_d
         load_survey(survey_file(tmp_path, geographic_survey("m", offset_deg, 1e-4)))
 
 
+@pytest.mark.parametrize(
+    ("offset", "span", "unit"),
+    [
+        ((0.0, 0.0), 0.01, "probably kilometres"),
+        ((-0.013, 0.003), 0.008, "probably kilometres"),
+        ((512.345123, 5612.345678), 0.008, "probably kilometres"),
+        ((-811961334.0, 286050246.0), 600.0, r"probably degrees times 10\^7"),
+        ((512345123.0, 5612345678.0), 8000.0, "probably millimetres of a map"),
+    ],
+)
+def test_other_units_that_no_metres_can_be_are_refused_by_name(
+    tmp_path: Path, offset: tuple[float, float], span: float, unit: str
+) -> None:
+    with pytest.raises(GroundError, match=unit):
+        load_survey(survey_file(tmp_path, geographic_survey("m", offset, span)))
+
+
+@pytest.mark.parametrize("offset_m", [(0.0, 0.0), (512345.1, 5612345.7), (-9038000.0, 3325000.0)])
+def test_metres_of_a_site_and_of_a_map_are_metres(tmp_path: Path, offset_m: tuple[float, float]) -> None:
+    load_survey(survey_file(tmp_path, geographic_survey("m", offset_m, 8.0)))
+
+
 def test_a_survey_in_degrees_gives_metres(tmp_path: Path) -> None:
     ground = load_survey(survey_file(tmp_path, geographic_survey("lonlat", (8.5, 50.1), 1e-4)))
     places_m, _ = updated(ground).to_ground(np.array([[100.0, 400.0], [500.0, 400.0], [100.0, 100.0]]))

@@ -65,15 +65,21 @@ def rows_reader(interface: Interface, trial: Mapping[str, Output]) -> OutputRead
 
 
 def columns_reader(interface: Interface, trial: Mapping[str, Output]) -> OutputReader:
-    """Read (1, 4 + C, N): centre and size, class probabilities; a box is a column.
+    """Read (1, 4 + C, N): centre and size, class probabilities; a box is a column, or a row after some conversions.
 
     Raises:
         UnreadableOutputs: There is no such output, or its numbers cannot be those.
     """
     classes = len(interface.classes)
     shape, count = "rows (1, 4 + classes, N)", _BOX + classes + more_columns(interface, trial)
-    name = find_output("rows", shape, lambda output: is_columns(output, count), interface, trial)
-    return _probabilities_reader(name, trial[name][0].T, lambda outputs: outputs[0][0].T, interface)
+
+    def is_either(output: Output) -> bool:
+        return is_columns(output, count) or is_table(output, count)
+
+    name = find_output("rows", shape, is_either, interface, trial)
+    if is_columns(trial[name], count):
+        return _probabilities_reader(name, trial[name][0].T, lambda outputs: outputs[0][0].T, interface)
+    return _probabilities_reader(name, trial[name][0], lambda outputs: outputs[0][0], interface)
 
 
 def probabilities_reader(interface: Interface, trial: Mapping[str, Output]) -> OutputReader:

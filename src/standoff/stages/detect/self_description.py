@@ -112,8 +112,13 @@ def _possible(known: Interface, trial: Mapping[str, Output]) -> dict[Family, Out
             found["yolov5"] = output[0]
         if is_table(output, 6 + more):
             found["yolov10"] = output[0]
-        if is_table(output, 4 + count) and known.task == "detect" and not more:
-            found["detr"] = output[0]
+        if is_table(output, 4 + count + more):
+            # Some tools turn the table over; of boxes that the network has chosen there are far fewer than cells.
+            boxes = output[0][:, :4]
+            if _fits_grid("yolov8", len(boxes), known) or (boxes.any() and not are_parts(boxes)):
+                found["yolov8"] = output[0]
+            elif known.task == "detect" and not more:
+                found["detr"] = output[0]
     return found
 
 
@@ -151,9 +156,12 @@ def _classes(names: object) -> tuple[str, ...]:
         names = dict(enumerate(names))
     if not isinstance(names, dict) or not names:
         raise ValueError("names that are neither a list nor ids with names")
+    pairs = list(names.items())
+    # JSON's keys are texts.
+    names = {int(key) if isinstance(key, str) and key.isdecimal() else key: name for key, name in pairs}
     ids = [number for number in names if type(number) is int]
-    if sorted(ids) != list(range(len(names))):
-        raise ValueError(f"ids other than 0 to {len(names) - 1} in names")
+    if sorted(ids) != list(range(len(pairs))):
+        raise ValueError(f"ids other than 0 to {len(pairs) - 1} in names")
     return tuple(str(names[number]).strip().lstrip(_BYTE_ORDER_MARK).strip() for number in range(len(names)))
 
 

@@ -8,6 +8,6 @@ with open_source("site.mp4", start_s=10.0, every=2) as source:
 """
 
 from standoff.stages.frames.pictures import ArrayPicture, AvPicture, Scaler
-from standoff.stages.frames.source import Source, frame_from_array, open_source
+from standoff.stages.frames.source import Source, frame_from_array, local_path, open_source
 
-__all__ = ["ArrayPicture", "AvPicture", "Scaler", "Source", "frame_from_array", "open_source"]
+__all__ = ["ArrayPicture", "AvPicture", "Scaler", "Source", "frame_from_array", "local_path", "open_source"]

@@ -16,6 +16,7 @@ from os import PathLike
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
+from urllib.parse import unquote
 
 from standoff.core.camera import CameraPrior
 from standoff.core.errors import SourceError
@@ -28,6 +29,8 @@ from standoff.stages.frames.video import VideoReader
 
 _ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:/")
 """A scheme has two letters or more; a drive has one. A path has lost the second slash."""
+
+_FILE_ADDRESS = re.compile(r"file:/*(?:/localhost)?/(?P<path>.*)", re.IGNORECASE)
 
 
 class Source:
@@ -133,6 +136,19 @@ class Source:
         self.close()
 
 
+def local_path(source: str | PathLike[str]) -> Path:
+    """Return the path of a source that may be written as a `file:` address.
+
+    >>> local_path("file:///films/site%201.mp4").as_posix(), local_path("films/site.mp4").as_posix()
+    ('/films/site 1.mp4', 'films/site.mp4')
+    """
+    address = _FILE_ADDRESS.fullmatch(str(source))
+    if address is None:
+        return Path(source)
+    path = unquote(address["path"])
+    return Path(path if re.match(r"[A-Za-z]:[/\\]", path) else f"/{path}")
+
+
 def _until(stop_s: float, shots: Iterator[Shot]) -> Iterator[Shot]:
     for shot in shots:
         if shot.time_s >= stop_s:
@@ -156,7 +172,7 @@ def open_source(
     its first picture, from the presentation timestamps.
 
     Args:
-        path: A video file (a single picture counts as one) or a folder that holds images only.
+        path: A video file (a single picture counts as one) or a folder that holds images only, or its `file:` address.
         stream_id: Name of the stream; the file's or folder's name by default.
         start_s: Begin with the first picture at or after this time.
         stop_s: End before the first picture at or after this time.
@@ -171,7 +187,7 @@ def open_source(
             be used.
         SourceTruncated: Its end, and with it the table of its pictures, is missing.
     """
-    path = Path(path)
+    path = local_path(path)
     selection = Selection(start_s, stop_s, every)
     selection.check()
     if fps is not None and not (math.isfinite(fps) and fps > 0):

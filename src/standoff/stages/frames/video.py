@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from fractions import Fraction
-from itertools import chain, dropwhile
+from itertools import chain, dropwhile, islice
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,8 @@ from standoff.stages.frames.reader import TIME_ROUNDING_S, Selection, Shot, chec
 from standoff.stages.frames.times import AviTicks, RisingTimes
 
 _UNDECODABLE_IN_A_ROW = 100
+_OPENING = 3
+"""Frames tell together whether the first one's time is wrong."""
 
 
 class VideoReader:
@@ -57,7 +59,8 @@ class VideoReader:
         self.rate_fps = header.rate_fps if fps is None else fps
         self._frames = self._decoded()
         try:
-            self._first = self._first_frame()
+            self._opening = self._opening_frames()
+            self._first, self._origin_pts = self._opening[0], self._begins_at()
             self.orientation = self._orientation()
             picture = self._picture(self._first)
         except SourceError:
@@ -74,11 +77,19 @@ class VideoReader:
         self._layout = self._what_was_chosen()
         self._about = self._describe()  # now: at the end the file may be gone
 
-    def _first_frame(self) -> av.VideoFrame:
-        first = next(self._frames, None)
-        if first is None:
+    def _opening_frames(self) -> list[av.VideoFrame]:
+        """Read the first frames, which tell together when the film begins."""
+        opening = list(islice(self._frames, _OPENING))
+        if not opening:
             raise not_a_video(self._path, "not one picture of which can be decoded")
-        return first
+        return opening
+
+    def _begins_at(self) -> int | None:
+        """Return when the first frame is shown, or the second where the first one's time is wrong; None: unknown."""
+        if any(frame.pts is None for frame in self._opening):
+            return None if self._opening[0].pts is None else int(self._opening[0].pts)
+        shown = [(float(frame.pts * self._header.time_base_s), "", int(frame.pts)) for frame in self._opening]
+        return next(pts for _, pts in RisingTimes("").in_order(shown))
 
     def _orientation(self) -> Orientation:
         try:
@@ -137,20 +148,23 @@ class VideoReader:
             SourceError: A timestamp is missing, or they increase no more.
         """
         first_index: int | None = None
-        last_index, latest = -1, self._first
-        for last_index, frame in self._numbered_from(wanted.start_s):
-            picture, label = self._picture(frame), f"frame {last_index}"
-            check_size(picture, self.size_px, label)
-            time_s = self._time_s(last_index, frame)
-            if self._fps is None and not self._times.passes(time_s, label):
-                continue
-            latest = frame
+        self._last_index, latest = -1, self._first
+        timed = self._timed(wanted.start_s)
+        given_rate = ((time_s, one) for time_s, _, one in timed)
+        for time_s, (index, latest) in self._times.in_order(timed) if self._fps is None else given_rate:
             if time_s < wanted.start_s - TIME_ROUNDING_S:
                 continue
-            first_index = last_index if first_index is None else first_index
-            if (last_index - first_index) % wanted.every == 0:
-                yield Shot(last_index, time_s, picture, label)
-        self._check_end(last_index, latest)
+            first_index = index if first_index is None else first_index
+            if (index - first_index) % wanted.every == 0:
+                yield Shot(index, time_s, self._picture(latest), f"frame {index}")
+        self._check_end(latest)
+
+    def _timed(self, start_s: float) -> Iterator[tuple[float, str, tuple[int, av.VideoFrame]]]:
+        """Yield frames with their times and labels, in the order of the file, and keep the last one's index."""
+        for index, frame in self._numbered_from(start_s):
+            self._last_index = index
+            check_size(self._picture(frame), self.size_px, f"frame {index}")
+            yield self._time_s(index, frame), f"frame {index}", (index, frame)
 
     def _numbered_from(self, start_s: float) -> Iterator[tuple[int, av.VideoFrame]]:
         """Yield all frames with their index, from the start or, where that is exact, from just before `start_s`."""
@@ -158,18 +172,18 @@ class VideoReader:
             jumped = self._jumped_to(start_s)
             if jumped is not None:
                 return jumped
-        return enumerate(chain([self._first], self._frames))
+        return enumerate(chain(self._opening, self._frames))
 
     def _time_s(self, index: int, frame: av.VideoFrame) -> float:
         if self._fps is not None:
             return index / self._fps
-        if frame.pts is None:
+        if frame.pts is None or self._origin_pts is None:
             raise SourceError(
                 expected="a timestamp on every frame",
                 found=f"none on frame {index} of {self._path.name}",
                 fix="rewrap the file with ffmpeg, or give its frame rate (--fps)",
             )
-        return float((frame.pts - self._first.pts) * self._header.time_base_s)
+        return float((frame.pts - self._origin_pts) * self._header.time_base_s)
 
     def _jumped_to(self, start_s: float) -> Iterator[tuple[int, av.VideoFrame]] | None:
         """Seek to the key frame before `start_s` and number from there; None, at the start, if that is unsure.
@@ -177,7 +191,7 @@ class VideoReader:
         A frame's index is the number of packets shown before it, counted without decoding them.
         """
         first = self._first
-        if first.pts is None or self._header.tells_decoding_times_only:
+        if first.pts is None or first.pts != self._origin_pts or self._header.tells_decoding_times_only:
             return None
         if first.interlaced_frame:  # its two fields may come as two packets
             return None
@@ -196,8 +210,7 @@ class VideoReader:
                 return enumerate(chain([first_shown], shown), start=first_index)
         self._container.close()
         self._container, self._stream = open_video(self._path)
-        self._frames = self._decoded()
-        next(self._frames)
+        self._frames, self._opening = self._decoded(), []
         return None
 
     def _count_packets(self, start_pts: int) -> tuple[int, int] | None:
@@ -225,18 +238,19 @@ class VideoReader:
             container.close()
         return None if key_frame_dts is None else (count, key_frame_dts)
 
-    def _check_end(self, index: int, frame: av.VideoFrame) -> None:
-        """Raise when reading failed, or `frame` is not where the header lets the video end."""
+    def _check_end(self, frame: av.VideoFrame) -> None:
+        """Raise when the clock began anew, reading failed, or `frame` is not where the header lets the video end."""
+        self._times.check_end()
         declared, end_s = self._header, 0.0
-        if frame.pts is not None:
-            end_s = float((frame.pts - self._first.pts + (frame.duration or 0)) * declared.time_base_s)
-        if not self._reading_error and not declared.ends_early(index + 1 + self._discarded, end_s):
+        if frame.pts is not None and self._origin_pts is not None:
+            end_s = float((frame.pts - self._origin_pts + (frame.duration or 0)) * declared.time_base_s)
+        if not self._reading_error and not declared.ends_early(self._last_index + 1 + self._discarded, end_s):
             return
         promised = f"{declared.declared_frames} frames" if declared.declared_frames else f"{declared.duration_s} s"
         reason = f" ({self._reading_error})" if self._reading_error else ""
         raise SourceTruncated(
             expected=f"{promised} in {self._path.name}, as its header says",
-            found=f"the end after {index + 1} frames and {end_s:.2f} s{reason}",
+            found=f"the end after {self._last_index + 1} frames and {end_s:.2f} s{reason}",
             fix="copy the file again; what was read up to there is sound",
         )
 

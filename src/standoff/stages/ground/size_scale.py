@@ -60,7 +60,7 @@ _UNITS = {
     "metres for feet": 0.3048,
     "metres for inches": 0.0254,
     "metres for centimetres": 0.01,
-    "metres for millimetres": 0.001,
+    "kilometres for metres": 0.001,
 }
 _UNIT_TOLERANCE = 1.3
 

@@ -27,7 +27,7 @@ import numpy as np
 
 from standoff.core.camera import Camera
 from standoff.core.errors import GroundError
-from standoff.core.geographic import GeographicOrigin, look_like_degrees
+from standoff.core.geographic import GeographicOrigin, likely_unit
 from standoff.core.homography import FloatArray
 from standoff.stages.ground.camera_file import load_camera
 from standoff.stages.ground.surveyed import SurveyedGround
@@ -100,12 +100,13 @@ def _points_m(points: Mapping[str, Mapping[str, Any]], path: Path) -> tuple[Floa
             return places, None
         origin = GeographicOrigin.of(places)
         return origin.to_metres(places), origin
-    if len(places) > 1 and look_like_degrees(places):
-        span_m = np.ptp(places, axis=0).max()
+    if unit := likely_unit(places):
+        span_m = float(np.ptp(places, axis=0).max())
+        size = f"{span_m:.2g} m" if span_m < 1.0 else f"{span_m:.0f} m, up to {np.abs(places).max():.0f} m off zero"
         raise GroundError(
             expected="m in metres",
-            found=f"points that all lie within {span_m:.2g} m in {path}, probably degrees of longitude and latitude",
-            fix="write lonlat: [longitude, latitude] in place of m",
+            found=f"points that all lie within {size} in {path}, probably {unit}",
+            fix="write metres, or lonlat: [longitude, latitude] in degrees in place of m",
         )
     return places, None
 
