@@ -9,7 +9,9 @@ import sys
 import pytest
 
 PUBLIC_NAMES = {
-    "standoff.stages.frames": {"ArrayPicture", "AvPicture", "Scaler", "Source", "frame_from_array", "open_source"},
+    "standoff.stages.frames": {
+        "ArrayPicture", "AvPicture", "Scaler", "Source", "frame_from_array", "local_path", "open_source",
+    },
     "standoff.stages.detect": {
         "DEFAULT_CLASS_MAP", "SHIPPED_MODELS", "DetectParams", "OnnxDetector", "RecordedDetector", "ShippedModel",
         "available_providers", "find_model",

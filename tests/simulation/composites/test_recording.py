@@ -103,6 +103,7 @@ def test_another_seed_gives_other_pictures(sets: SimpleNamespace, tmp_path: Path
     assert other.read_bytes() not in set(_content(sets.one).values())
 
 
+@pytest.mark.live
 def test_as_many_machines_as_are_asked_for(sets: SimpleNamespace, tmp_path: Path) -> None:
     """None where none may be, and more where more may be."""
     found = {}

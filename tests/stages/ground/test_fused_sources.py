@@ -172,6 +172,7 @@ def test_the_gate_lets_pass_what_the_covariance_allows() -> None:
     assert agrees(view, covariance * 1e4, away, 0.0)
 
 
+@pytest.mark.live
 def test_a_hidden_marker_s_map_is_carried_and_ends_when_nobody_knows_how_the_camera_moved() -> None:
     ground, view = by_marker(), looking()
     ground.update(frame(pictured(view)), NOTHING, unmoved())
