@@ -21,8 +21,9 @@ from pathlib import Path
 
 import numpy as np
 
-from standoff.core.classes import CLASSES, Role
+from standoff.core.classes import CLASSES
 from standoff.core.homography import BoolArray, FloatArray
+from standoff.core.roles import IS_EQUIPMENT
 from standoff.core.types import GroundMap, Hazard, IntArray, Proximities, Tracks
 from standoff.simulation.casting import CASTS, Stage
 from standoff.simulation.motion import sample
@@ -33,7 +34,7 @@ from standoff.stages.proximity import ProximityMeter, ProximityParams
 from standoff.stages.proximity.excuses import Excuses
 
 CLIP_S, STEP_S = 120.0, 0.2
-PX_PER_M, SIZE_PX = 100.0, (40_000, 40_000)
+PX_PER_M, SIZE_PX, MIDDLE_M = 100.0, (40_000, 40_000), 200.0
 LIMITS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.7, 0.9)
 AHEAD_S, HORIZON_S = 2.0, 3.0
 CHANGING_M = {"worker": 0.08, "excavator": 0.2}
@@ -111,24 +112,35 @@ def seen(shift: Shift, rng: np.random.Generator, error: float) -> Iterator[Track
         bias_m = kept * bias_m + np.sqrt(1.0 - kept**2) * lasting_m[:, None] * rng.normal(size=(count, 2))
         hides = (hidden_s <= 0.0) & (rng.random(count) < HIDDEN_PER_S * STEP_S)
         hidden_s = np.where(hides, rng.uniform(*HIDDEN_S, count), hidden_s - STEP_S)
-        foot_px = PX_PER_M * (xy_m + bias_m + changing_m[:, None] * rng.normal(size=(count, 2)) + 200.0)
-        yield Tracks(
-            track_id=np.arange(1, count + 1),
-            xyxy_px=np.concatenate([foot_px - 60.0, foot_px + 60.0], axis=1),
-            score=np.full(count, 0.9),
-            class_id=shift.class_id,
-            observed=(hidden_s <= 0.0) & (rng.random(count) >= MISSED),
-            age_s=np.full(count, CLIP_S),
-            foot_px=foot_px,
-            foot_covariance_px2=variance_px2[:, None, None] * np.eye(2),
-        )
+        places_m = xy_m + bias_m + changing_m[:, None] * rng.normal(size=(count, 2))
+        yield _tracks(shift, places_m, (hidden_s <= 0.0) & (rng.random(count) >= MISSED), variance_px2)
+
+
+def _map() -> GroundMap:
+    """Return the exact map of a picture that shows the site from straight above."""
+    matrix = np.diag([1 / PX_PER_M, 1 / PX_PER_M, 1.0])
+    matrix[:2, 2] = -MIDDLE_M
+    return GroundMap(matrix, np.zeros((9, 9)), SIZE_PX, "exact", 1 / PX_PER_M)
+
+
+def _tracks(shift: Shift, places_m: FloatArray, observed: BoolArray, variance_px2: FloatArray) -> Tracks:
+    """Return everybody as the tracker would tell them in that picture."""
+    count, foot_px = len(places_m), PX_PER_M * (places_m + MIDDLE_M)
+    return Tracks(
+        track_id=np.arange(1, count + 1),
+        xyxy_px=np.concatenate([foot_px - 60.0, foot_px + 60.0], axis=1),
+        score=np.full(count, 0.9),
+        class_id=shift.class_id,
+        observed=observed,
+        age_s=np.full(count, CLIP_S),
+        foot_px=foot_px,
+        foot_covariance_px2=variance_px2[:, None, None] * np.eye(2),
+    )
 
 
 def run(shift: Shift, rng: np.random.Generator, error: float) -> dict[float, dict[Pair, list[Span]]]:
     """Return for each limit when hazards of each pair were open."""
-    matrix = np.diag([1 / PX_PER_M, 1 / PX_PER_M, 1.0])
-    matrix[:2, 2] = -200.0
-    ground = GroundMap(matrix, np.zeros((9, 9)), SIZE_PX, "exact", 1 / PX_PER_M)
+    ground = _map()
     locator, meter = Locator(), ProximityMeter(ProximityParams(horizon_s=HORIZON_S))
     monitors = {limit: HazardMonitor(HazardParams(warning_probability=limit)) for limit in LIMITS}
     open_at: dict[float, dict[str, tuple[Pair, float]]] = {limit: {} for limit in LIMITS}
@@ -161,12 +173,12 @@ def _follow(event: Hazard, open_at: dict[str, tuple[Pair, float]], spans: dict[P
 
 def true_breaches(shift: Shift) -> dict[Pair, list[Span]]:
     """Return when the gap of each pair was negative; breaches less than a second apart are one."""
-    roles = np.array([CLASSES[i].role is Role.EQUIPMENT for i in shift.class_id])
+    machines = IS_EQUIPMENT[shift.class_id]
     radii_m = np.array([CLASSES[i].action_radius_m for i in shift.class_id])
     excused = _truly_excused(shift)
     breaches: dict[Pair, list[Span]] = {}
-    for a in np.flatnonzero(~roles):
-        for b in np.flatnonzero(roles):
+    for a in np.flatnonzero(~machines):
+        for b in np.flatnonzero(machines):
             first, second = sorted((int(a), int(b)))
             gap_m = np.linalg.norm(shift.xy_m[:, a] - shift.xy_m[:, b], axis=1) - radii_m[a] - radii_m[b]
             inside = (gap_m < 0.0) & ~excused[first, second]
@@ -184,19 +196,12 @@ def true_breaches(shift: Shift) -> dict[Pair, list[Span]]:
 def _truly_excused(shift: Shift) -> dict[Pair, BoolArray]:
     """Return (T,) for each pair when the product's own rules, told the truth, call it no hazard."""
     exact = Locator()
-    matrix = np.diag([1 / PX_PER_M, 1 / PX_PER_M, 1.0])
-    matrix[:2, 2] = -200.0
-    ground = GroundMap(matrix, np.zeros((9, 9)), SIZE_PX, "exact", 1 / PX_PER_M)
+    ground = _map()
     count = len(shift.class_id)
     a, b = np.triu_indices(count, k=1)
     rules, told = Excuses(ProximityParams()), []
     for k, xy_m in enumerate(shift.xy_m):
-        foot_px = PX_PER_M * (xy_m + 200.0)
-        tracks = Tracks(
-            np.arange(1, count + 1), np.concatenate([foot_px - 60.0, foot_px + 60.0], axis=1), np.full(count, 0.9),
-            shift.class_id, np.ones(count, dtype=bool), np.full(count, CLIP_S), foot_px,
-            np.tile(0.01 * np.eye(2), (count, 1, 1)),
-        )  # fmt: skip
+        tracks = _tracks(shift, xy_m, np.ones(count, dtype=bool), np.full(count, 0.01))
         positions = exact.update(k * STEP_S, tracks, ground)
         distance_m = np.linalg.norm(positions.xy_m[b] - positions.xy_m[a], axis=1)
         told.append(rules.update(positions, a, b, distance_m) != "")

@@ -15,8 +15,9 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from standoff.core.classes import CLASSES, Role
+from standoff.core.classes import CLASSES
 from standoff.core.homography import FloatArray
+from standoff.core.roles import IS_EQUIPMENT
 from standoff.core.types import IntArray
 
 
@@ -38,7 +39,6 @@ SPEED_MPS: Final = np.array([_MOTION_OF[site_class.name].speed_mps for site_clas
 """(C,) standard deviation of each coordinate's velocity, by class."""
 MEMORY_S: Final = np.array([_MOTION_OF[site_class.name].memory_s for site_class in CLASSES])
 """(C,) after so many seconds a third of a velocity is left, by class."""
-_IS_MACHINE: Final = np.array([site_class.role is Role.EQUIPMENT for site_class in CLASSES])
 _STANDING_S, _STARTING_SHARE = 2.0, 0.4
 """A machine that stood for so long gets no further in three seconds than some metre, other than one that drives."""
 
@@ -68,7 +68,7 @@ def wandering(class_id: IntArray, step_s: float, standing_s: FloatArray | None =
     """
     memory_s, variance = MEMORY_S[class_id], SPEED_MPS[class_id] ** 2
     if standing_s is not None:
-        variance = np.where((standing_s >= _STANDING_S) & _IS_MACHINE[class_id], _STARTING_SHARE**2, 1.0) * variance
+        variance = np.where((standing_s >= _STANDING_S) & IS_EQUIPMENT[class_id], _STARTING_SHARE**2, 1.0) * variance
     steps = step_s / memory_s
     left = np.exp(-steps)
     matrix = np.zeros((len(class_id), 4, 4))

@@ -5,9 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from standoff.core.classes import CLASSES, Role
+from standoff.core.homography import BoolArray
 
 ROLE_OF_CLASS = np.array([list(Role).index(site_class.role) for site_class in CLASSES])
 """By class id, the position of its role in `Role`."""
 
 REFERENCE_ROLE = list(Role).index(Role.REFERENCE)
 PERSON_ROLE = list(Role).index(Role.PERSON)
+IS_EQUIPMENT: BoolArray = np.array([site_class.role is Role.EQUIPMENT for site_class in CLASSES])
+"""By class id."""

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from standoff.core.boxes import areas_px2, shared_px2
 from standoff.core.camera import CameraPrior
 from standoff.core.homography import FloatArray
 from standoff.core.pose import View
@@ -359,5 +360,4 @@ class SolidObserver:
 
 def _covered(box: FloatArray, by: FloatArray) -> float:
     """Return the share of a box (4,) that another covers."""
-    sides = np.minimum(box[2:], by[2:]) - np.maximum(box[:2], by[:2])
-    return float(np.prod(np.maximum(sides, 0.0)) / np.prod(np.maximum(box[2:] - box[:2], 1e-9)))
+    return float(shared_px2(box[None], by[None])[0, 0] / max(areas_px2(box[None])[0], 1e-9))

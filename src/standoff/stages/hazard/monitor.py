@@ -11,10 +11,11 @@ from standoff.core.types import GroundMap, GroundPositions, Hazard, NoGroundMap,
 from standoff.core.zones import Zone
 from standoff.stages.hazard.absence import AbsenceWatch
 from standoff.stages.hazard.follow import FollowWatch
+from standoff.stages.hazard.levels import levels_of
 from standoff.stages.hazard.life import NOT_MEASURED, NOT_WATCHED, TRACK_LOST, Reading
 from standoff.stages.hazard.load import AlarmLoad
-from standoff.stages.hazard.pair import PairWatch
 from standoff.stages.hazard.params import HazardParams
+from standoff.stages.hazard.watch import Watch
 from standoff.stages.hazard.zone import ZoneRule
 
 Pair = tuple[int, int]
@@ -44,7 +45,7 @@ class HazardMonitor:
         self._given_zones = tuple(zones)
         self._map = AbsenceWatch(self._params, MAP_IS_BACK)
         self._follow = FollowWatch(self._params)
-        self._pairs: dict[Pair, PairWatch] = {}
+        self._pairs: dict[Pair, Watch] = {}
         self._load = AlarmLoad()
         self._looked_s = math.inf
         self._zones = ZoneRule(self._given_zones, self._params)
@@ -79,13 +80,13 @@ class HazardMonitor:
         readings = _readings(proximities)
         reasons = dict(zip(positions.track_id.tolist(), positions.reason.tolist(), strict=True))
         for pair in sorted(self._pairs.keys() | readings.keys()):
-            watch = self._pairs.setdefault(pair, PairWatch(pair, self._params))
+            watch = self._pairs.setdefault(pair, Watch("proximity", pair, self._params))
             reading = readings.get(pair)
             if reading is None:
                 followed = reasons.keys() >= set(pair)
                 events.append(watch.lose(time_s, NOT_WATCHED if followed else TRACK_LOST))
-            elif watch.measurable(reading):
-                events.append(watch.measure_pair(time_s, reading, rare=rare))
+            elif (levels := levels_of(reading, self._params)) is not None:
+                events.append(watch.measure(time_s, reading, levels.near, levels.breached, rare=rare))
             else:
                 reason = reasons.get(pair[0]) or reasons.get(pair[1]) or NOT_MEASURED
                 events.append(watch.miss(time_s, reason, may_open=bool(ground)))

@@ -14,8 +14,9 @@ from typing import Final
 
 import numpy as np
 
-from standoff.core.classes import CLASS_BY_NAME, CLASSES, Role
+from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.homography import BoolArray, FloatArray
+from standoff.core.roles import IS_EQUIPMENT
 from standoff.core.types import GroundPositions, IntArray, TextArray
 from standoff.stages.proximity.params import ProximityParams
 
@@ -27,7 +28,6 @@ _CAB_WITHIN_M: Final = 2.5
 """A driver is so near to the middle of the machine, all the way."""
 _CAB_TRAVEL_M: Final = 4.0
 """Nobody who walks beside it keeps so near while it drives so far."""
-_ROLES = np.array([site_class.role is Role.EQUIPMENT for site_class in CLASSES])
 _EXCAVATOR = CLASS_BY_NAME["excavator"].id
 
 Pair = tuple[int, int]
@@ -68,8 +68,8 @@ class Excuses:
             distance_m: (K,); NaN where it is not measured, which is never excused.
         """
         excuse: TextArray = np.full(len(a), "", dtype=object)
-        machine = np.where(_ROLES[positions.class_id[a]], a, b)
-        mixed = _ROLES[positions.class_id[a]] != _ROLES[positions.class_id[b]]
+        machine = np.where(IS_EQUIPMENT[positions.class_id[a]], a, b)
+        mixed = IS_EQUIPMENT[positions.class_id[a]] != IS_EQUIPMENT[positions.class_id[b]]
         excuse[mixed & self._parked(positions, machine)] = PARKED
         excuse[mixed & self._riding(positions, a, b, machine, distance_m)] = IN_CAB
         for row, pair in enumerate(_ids(positions, a, b)):

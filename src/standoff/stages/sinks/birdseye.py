@@ -7,7 +7,7 @@ import numpy as np
 
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import GroundMap, ImageArray, NoGroundMap
-from standoff.stages.sinks.fans import FAN_OPACITY, fans_of
+from standoff.stages.sinks.fans import FAN_OPACITY
 from standoff.stages.sinks.ground_window import GroundWindow, camera_up, rectify, seen_ground_m, window_around
 from standoff.stages.sinks.painter import Painter
 from standoff.stages.sinks.palette import bgr
@@ -95,7 +95,7 @@ class BirdsEye:
                 if sketch.tones[i] in ("danger", "warning"):
                     painter.fill(outline, bgr(sketch.tones[i]), 0.2)
                 painter.line(outline, bgr(sketch.tones[i]), dashed=not observed[i])
-        for fan in fans_of(sketch.scene.positions) if self._params.fans else ():
+        for fan in sketch.fans:
             painter.fill(window.to_window(fan.outline_m), bgr(sketch.tones[fan.row]), FAN_OPACITY)
             painter.line(window.to_window(fan.path_m), bgr(sketch.tones[fan.row]))
         for line in reversed(sketch.lines):

@@ -7,7 +7,7 @@ import numpy as np
 from standoff.core.homography import FloatArray
 from standoff.core.types import GroundMap, ImageArray, NoGroundMap
 from standoff.core.zones import NOT_PLACED
-from standoff.stages.sinks.fans import FAN_OPACITY, fans_of
+from standoff.stages.sinks.fans import FAN_OPACITY
 from standoff.stages.sinks.ground_shapes import circle_outlines_px, outlines_in_sight_px
 from standoff.stages.sinks.painter import Painter
 from standoff.stages.sinks.palette import Tone, bgr
@@ -67,8 +67,7 @@ class Overlay:
             _draw_anchors(painter, to_canvas, scene.ground)
             if self._params.circles:
                 _draw_circles(painter, to_canvas, sketch, scene.ground)
-            if self._params.fans:
-                _draw_fans(painter, to_canvas, sketch, scene.ground)
+            _draw_fans(painter, to_canvas, sketch, scene.ground)
         _draw_boxes(painter, to_canvas, sketch)
         _draw_lines(painter, to_canvas, sketch)
         _draw_status(painter, canvas, scene)
@@ -124,7 +123,7 @@ def _draw_circles(painter: Painter, to_canvas: _ToCanvas, sketch: Sketch, ground
 
 
 def _draw_fans(painter: Painter, to_canvas: _ToCanvas, sketch: Sketch, ground: GroundMap) -> None:
-    for fan in fans_of(sketch.scene.positions):
+    for fan in sketch.fans:
         (path_px, path_seen), (outline_px, outline_seen) = ground.to_image(fan.path_m), ground.to_image(fan.outline_m)
         if path_seen.all() and outline_seen.all():
             painter.fill(to_canvas(outline_px), bgr(sketch.tones[fan.row]), FAN_OPACITY)

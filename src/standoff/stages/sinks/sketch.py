@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from standoff.core.homography import FloatArray
+from standoff.stages.sinks.fans import Fan, fans_of
 from standoff.stages.sinks.pair_lines import PairLine, pair_lines
 from standoff.stages.sinks.palette import Tone
 from standoff.stages.sinks.params import DrawParams
@@ -20,15 +21,18 @@ class Sketch:
         tones: Colour of each track.
         feet_px: (M, 2) where each track stands, in full-size picture pixels.
         lines: Pairs to draw, gravest first.
+        fans: What is ahead of those who move.
     """
 
     scene: Scene
     tones: list[Tone]
     feet_px: FloatArray
     lines: list[PairLine]
+    fans: list[Fan]
 
     @classmethod
     def of(cls, scene: Scene, params: DrawParams) -> Sketch:
         """Decide what to draw."""
         feet_px = scene.feet_px()
-        return cls(scene, scene.track_tones(), feet_px, pair_lines(scene, feet_px, params.line_within_m))
+        fans = fans_of(scene.positions) if params.fans else []
+        return cls(scene, scene.track_tones(), feet_px, pair_lines(scene, feet_px, params.line_within_m), fans)
