@@ -10,11 +10,11 @@ import numpy as np
 from standoff.core import homography
 from standoff.core.camera import Camera
 from standoff.core.homography import BoolArray, FloatArray
+from standoff.core.map_error import map_jacobian
 from standoff.core.pose import View
 from standoff.core.types import CameraMotion, GroundMap, ImageArray
 from standoff.stages.ground.shape import ReferenceShape
 from standoff.stages.ground.solid import SolidState
-from standoff.stages.locate.uncertainty import map_jacobian
 
 SIZE_PX = (640, 360)
 MOTION_PX = 0.05

@@ -24,6 +24,7 @@ from standoff.stages.locate import Locator
 from standoff.stages.motion import MotionEstimator
 from standoff.stages.proximity import ProximityMeter
 from standoff.stages.track import Tracker
+from standoff.stages.watched import GroundWatcher
 
 
 class Memory:
@@ -81,6 +82,7 @@ def pipeline(source: Iterator[Frame], *sinks: Memory, detect_every: int = 1, map
         ground=MetreGround() if mapped else Unmapped(),
         tracker=Tracker(),
         locator=Locator(),
+        watcher=GroundWatcher(),
         proximity=ProximityMeter(),
         hazard=HazardMonitor(),
         sinks={f"sink{number}": sink for number, sink in enumerate(sinks)},
@@ -100,7 +102,8 @@ def test_every_frame_reaches_every_sink_with_the_time_of_each_stage() -> None:
     assert (
         [result.frame.index for result in memory.results] == [result.frame.index for result in results] == [*range(5)]
     )
-    stages = {"frames", "detect", "motion", "ground", "track", "locate", "proximity", "hazard", "sinks.sink0"}
+    stages = {"frames", "detect", "motion", "ground", "track", "locate", "watched"}
+    stages |= {"proximity", "hazard", "sinks.sink0"}
     assert set(results[0].stage_ms) == stages
     assert memory.outcomes[0].status == "complete"
 

@@ -14,6 +14,7 @@ from standoff.core.protocols import (
     CameraMotionEstimator,
     Detector,
     Ground,
+    GroundWatcher,
     HazardMonitor,
     Locator,
     ProximityMeter,
@@ -57,6 +58,7 @@ class Pipeline:
     ground: Ground
     tracker: Tracker
     locator: Locator
+    watcher: GroundWatcher
     proximity: ProximityMeter
     hazard: HazardMonitor
     sinks: Mapping[str, Sink] = field(default_factory=dict)
@@ -115,12 +117,14 @@ class Pipeline:
             lost = unfollowed(detections, tracks, self.sure_score)
         with _clocked(stage_ms, "locate"):
             positions = self.locator.update(frame.time_s, tracks, ground)
+        with _clocked(stage_ms, "watched"):
+            watched = self.watcher.update(frame, ground, tracks, positions)
         with _clocked(stage_ms, "proximity"):
             proximities = self.proximity.update(frame.time_s, positions, ground)
         with _clocked(stage_ms, "hazard"):
-            hazards = self.hazard.update(frame.time_s, positions, proximities, ground, lost)
+            hazards = self.hazard.update(frame.time_s, positions, proximities, ground, lost, watched)
         return FrameResult(
-            frame, detections, detect, motion, ground, tracks, positions, proximities, hazards, stage_ms, lost
+            frame, detections, detect, motion, ground, tracks, positions, proximities, hazards, stage_ms, lost, watched
         )
 
     def _is_near(self, proximities: Proximities) -> bool:

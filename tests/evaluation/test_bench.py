@@ -24,6 +24,7 @@ from standoff.stages.locate import Locator
 from standoff.stages.motion import MotionEstimator
 from standoff.stages.proximity import ProximityMeter
 from standoff.stages.track import Tracker
+from standoff.stages.watched import GroundWatcher
 
 SMALL_PX = (480, 270)
 
@@ -36,6 +37,7 @@ def pipeline(site: Site, kind: Literal["surveyed", "reference"], frames: int = 2
         ground=site.ground(kind),
         tracker=Tracker(),
         locator=Locator(),
+        watcher=GroundWatcher(),
         proximity=ProximityMeter(),
         hazard=HazardMonitor(),
         sinks={"drawing": DrawingSink()},

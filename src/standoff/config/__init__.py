@@ -10,6 +10,7 @@ from standoff.config.build import (
     build_pipeline,
     build_replacement,
     build_stage,
+    build_watcher,
     build_zones,
     import_factory,
 )
@@ -38,6 +39,7 @@ __all__ = [
     "build_pipeline",
     "build_replacement",
     "build_stage",
+    "build_watcher",
     "build_zones",
     "import_factory",
     "load_settings",

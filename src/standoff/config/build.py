@@ -8,7 +8,9 @@ from typing import Any
 
 from standoff.config.settings import ReferenceSettings, Replacement, Settings, StageName
 from standoff.core.camera import Camera, CameraPrior
+from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.errors import ConfigError
+from standoff.core.finding import WorkerFinding
 from standoff.core.protocols import CameraMotionEstimator, Detector, Ground
 from standoff.core.types import Frame
 from standoff.core.zones import Zone
@@ -33,6 +35,7 @@ from standoff.stages.locate import Locator
 from standoff.stages.motion import MotionEstimator
 from standoff.stages.proximity import ProximityMeter, side_classes
 from standoff.stages.track import Tracker
+from standoff.stages.watched import GroundWatcher
 
 
 def import_factory(replacement: Replacement) -> Callable[..., Any]:
@@ -149,6 +152,21 @@ def build_ground(settings: Settings, known: CameraPrior | None = None) -> Ground
     return ScaleWatch(fused, prior)
 
 
+def build_watcher(settings: Settings, detector: Detector) -> GroundWatcher:
+    """Make what judges which ground is watched.
+
+    Args:
+        settings: Of everything.
+        detector: Says of itself how small a worker it finds.
+    """
+    worker = CLASS_BY_NAME["worker"]
+    return GroundWatcher(
+        settings.watched,
+        WorkerFinding.of_detector(getattr(detector, "description", {})),
+        settings.locate.radius_m.get(worker.name, worker.action_radius_m),
+    )
+
+
 def build_zones(settings: Settings) -> tuple[Zone, ...]:
     """Read the configured zones; those in degrees are placed by the survey.
 
@@ -194,13 +212,16 @@ _MAKERS: Mapping[StageName, Callable[[Settings], Any]] = {
 }
 
 
-def build_stage(name: StageName, settings: Settings, camera: CameraPrior | None = None) -> Any:  # noqa: ANN401
+def build_stage(
+    name: StageName, settings: Settings, camera: CameraPrior | None = None, detector: Detector | None = None
+) -> Any:  # noqa: ANN401
     """Make one stage, standoff's own or the configured replacement.
 
     Args:
         name: Of the stage.
         settings: Of everything.
-        camera: What the source knows of its camera.
+        camera: What the source knows of its camera; for the ground.
+        detector: For the watched ground; the configured one is made where it is left out.
 
     Raises:
         StandoffError: Something that the settings name cannot be used.
@@ -210,6 +231,8 @@ def build_stage(name: StageName, settings: Settings, camera: CameraPrior | None 
         return build_replacement(name, settings.replace[name])
     if name == "ground":
         return build_ground(settings, camera)
+    if name == "watched":
+        return build_watcher(settings, detector or build_stage("detect", settings))
     return _MAKERS[name](settings)
 
 
@@ -255,6 +278,7 @@ def build_pipeline(settings: Settings, frames: Iterable[Frame], camera: CameraPr
         ground=build_stage("ground", settings, camera),
         tracker=build_stage("track", settings),
         locator=build_stage("locate", settings),
+        watcher=build_stage("watched", settings, detector=detector),
         proximity=build_stage("proximity", settings),
         hazard=build_stage("hazard", settings),
         detect_every=settings.detect_every,

@@ -20,12 +20,13 @@ from standoff.stages.motion import MotionParams
 from standoff.stages.proximity import ProximityParams
 from standoff.stages.sinks import ReportParams, TableParams, VideoParams
 from standoff.stages.track import TrackParams
+from standoff.stages.watched import WatchedParams
 
 Point = tuple[float, float]
 OutputName = Literal["tracks", "proximity", "frames", "detections", "hazards", "video", "report"]
 OUTPUT_NAMES: tuple[OutputName, ...] = ("tracks", "proximity", "frames", "detections", "hazards", "video", "report")
-StageName = Literal["detect", "motion", "ground", "track", "locate", "proximity", "hazard"]
-STAGE_NAMES: tuple[StageName, ...] = ("detect", "motion", "ground", "track", "locate", "proximity", "hazard")
+StageName = Literal["detect", "motion", "ground", "track", "locate", "watched", "proximity", "hazard"]
+STAGE_NAMES: tuple[StageName, ...] = ("detect", "motion", "ground", "track", "locate", "watched", "proximity", "hazard")
 
 
 class _Section(BaseModel):
@@ -209,6 +210,9 @@ class Settings(BaseSettings):
     ground: Annotated[GroundSettings, Field(description="The ground map.")] = GroundSettings()
     track: Annotated[TrackParams, Field(description="The tracker.")] = TrackParams()
     locate: Annotated[LocateParams, Field(description="From boxes to places on the ground.")] = LocateParams()
+    watched: Annotated[WatchedParams, Field(description="Where on the ground a worker would be found.")] = (
+        WatchedParams()
+    )
     zones: Annotated[
         Path | None,
         Field(description="GeoJSON file of zones in the site frame, and who must not be in them. Absent: none."),

@@ -16,6 +16,7 @@ from standoff.core.types import (
     NoGroundMap,
     Proximities,
     Tracks,
+    WatchedGround,
 )
 
 AnyGround = GroundMap | NoGroundMap
@@ -78,6 +79,14 @@ class Locator(Protocol):
         ...
 
 
+class GroundWatcher(Protocol):
+    """Judge which of the ground is watched."""
+
+    def update(self, frame: Frame, ground: AnyGround, tracks: Tracks, positions: GroundPositions) -> WatchedGround:
+        """Return what would be found where in this frame."""
+        ...
+
+
 class ProximityMeter(Protocol):
     """Measure how close entities are."""
 
@@ -96,6 +105,7 @@ class HazardMonitor(Protocol):
         proximities: Proximities,
         ground: AnyGround,
         unfollowed: BoolArray,
+        watched: WatchedGround,
     ) -> tuple[Hazard, ...]:
         """Return the events of this frame; `unfollowed` (K,) tells which of its sure detections no track shows."""
         ...

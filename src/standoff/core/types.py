@@ -24,6 +24,7 @@ from standoff.core.motions import CameraMotion as CameraMotion
 from standoff.core.motions import NoCameraMotion as NoCameraMotion
 from standoff.core.rows import Columns, Rows
 from standoff.core.telemetry import Telemetry
+from standoff.core.watched_ground import WatchedGround as WatchedGround
 
 IntArray = npt.NDArray[np.int64]
 ImageArray = npt.NDArray[np.uint8]
@@ -335,6 +336,7 @@ class FrameResult:
         hazards: The events of this frame, not the state.
         stage_ms: Milliseconds spent in each stage on this frame; sinks add theirs ("sinks.NAME") one after another.
         unfollowed: (K,) which of the frame's sure detections no track shows; left out: there were none.
+        watched: Where on the ground a worker would be found; left out: nobody judged.
     """
 
     frame: Frame
@@ -348,6 +350,7 @@ class FrameResult:
     hazards: tuple[Hazard, ...]
     stage_ms: Mapping[str, float]
     unfollowed: BoolArray = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
+    watched: WatchedGround = field(default_factory=WatchedGround)
 
 
 @dataclass(frozen=True, slots=True)

@@ -42,6 +42,7 @@ from standoff.stages.sinks import (
 )
 from standoff.stages.sinks.scene import OpenHazards, Scene
 from standoff.stages.track import Tracker
+from standoff.stages.watched import GroundWatcher
 
 _RATE_FPS = 30.0
 _CAMERA_HEIGHT_M = 20.0
@@ -191,6 +192,7 @@ def monitor_workload(
             ground=site.ground(ground),
             tracker=Tracker(),
             locator=Locator(),
+            watcher=GroundWatcher(),
             proximity=ProximityMeter(),
             hazard=HazardMonitor(),
             sinks=_sinks(Path(folder)),

@@ -6,7 +6,8 @@ from tolerances import GEOMETRY_REL, NUMERICAL_DERIVATIVE_REL
 
 from standoff.core.camera import Camera
 from standoff.core.homography import FloatArray
-from standoff.stages.locate.uncertainty import factor, own_covariance, undistortion_jacobian
+from standoff.core.map_error import factor, undistortion_jacobian
+from standoff.stages.locate.uncertainty import own_covariance
 
 LENS = np.array([-0.12, 0.03, 0.001, -0.0008, 0.0])
 GROUND_M = np.array([[0.0, 35.0], [-8.0, 28.0], [12.0, 45.0]])

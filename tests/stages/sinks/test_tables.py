@@ -46,6 +46,7 @@ TRACK_COLUMNS = [
     "reason",
     "standing_s",
     "sight",
+    "around_watched",
 ]
 PROXIMITY_COLUMNS = [
     "stream_id",

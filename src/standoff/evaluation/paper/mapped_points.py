@@ -8,12 +8,12 @@ from typing import Self
 import numpy as np
 
 from standoff.core.homography import FloatArray
+from standoff.core.map_error import map_jacobian
 from standoff.core.pose import View
 from standoff.core.types import GroundMap
 from standoff.evaluation.paper.clip import Clip
 from standoff.evaluation.paper.turning import Turning
 from standoff.stages.ground import load_camera
-from standoff.stages.locate.uncertainty import map_jacobian
 
 
 @dataclass(frozen=True, slots=True, eq=False)

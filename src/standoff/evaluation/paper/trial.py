@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from standoff.clips import is_recording
-from standoff.config import Settings, build_stage, load_settings
+from standoff.config import Settings, build_stage, build_watcher, load_settings
 from standoff.core.errors import DataError
 from standoff.core.protocols import Detector, Tracker
 from standoff.evaluation.paper.clip import Clip, TrueReference
@@ -121,6 +121,7 @@ def build_monitor(clip: Clip, trial: Trial, source: Source) -> Pipeline:
         ground=ground.inner if isinstance(ground, ScaleWatch) else ground,
         tracker=tracker,
         locator=build_stage("locate", settings),
+        watcher=build_watcher(settings, detector),
         proximity=build_stage("proximity", settings),
         hazard=build_stage("hazard", settings),
     )

@@ -10,6 +10,7 @@ import numpy as np
 import onnxruntime
 
 from standoff.core.classes import CLASS_BY_NAME
+from standoff.core.finding import KEY
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import Detections, Frame, ImageArray, IntArray
 from standoff.stages.detect.candidates import Candidates
@@ -19,7 +20,7 @@ from standoff.stages.detect.letterbox import Letterbox, resize
 from standoff.stages.detect.model_card import file_sha256
 from standoff.stages.detect.network import Network
 from standoff.stages.detect.params import DetectParams
-from standoff.stages.detect.slices import View, held_whole_px, views
+from standoff.stages.detect.slices import View, held_whole_px, view_share, views
 from standoff.stages.detect.suppression import join_cut, prefer_finer, suppress
 
 _CUT_MARGIN_INPUT_PX = 4.0
@@ -82,6 +83,8 @@ class OnnxDetector:
             "boxes": "parts of the input" if self._network.boxes_are_parts else "as usual in the family",
             "warnings": list(self._network.warnings),
             "input_size_px": list(self._network.interface.input_size_px),
+            "view_share": list(view_share(self._params.slices, self._params.slice_overlap)),
+            KEY: dict(self._network.interface.finds_workers),
             "classes": list(self._classes),
             "class_map": dict(self._site_class_of),
             "ignored_labels": [label for label in self._classes if label not in self._site_class_of],

@@ -21,7 +21,7 @@ Where the model says of itself what it is, everything may be left out, and what 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final, Literal, get_args
@@ -60,6 +60,7 @@ class Interface:
         output_names: Role to name, where shapes do not tell.
         task: What else than boxes its rows end with.
         keypoint_values: Numbers for the key points of a box, if that is the task.
+        finds_workers: As in `standoff.stages.detect.model_card.ModelCard`.
     """
 
     family: Family
@@ -69,6 +70,7 @@ class Interface:
     output_names: Mapping[str, str] = field(default_factory=dict)
     task: Task = "detect"
     keypoint_values: int = 0
+    finds_workers: Mapping[str, Sequence[float]] = field(default_factory=dict)
 
     @property
     def finds_once(self) -> bool:

@@ -1,7 +1,8 @@
 """What a detector's ONNX file says about itself, written by the export and read by the detector.
 
 The metadata of the file holds one text a key: `standoff_format`, and as JSON `classes`, `anchors_px`,
-`input_size_px`, `preprocessing`, `output` and `sources`. The graph has one input, and one output or two:
+`input_size_px`, `preprocessing`, `output`, `sources` and, where it was measured, `finds_workers`. The graph
+has one input, and one output or two:
 
 - input `picture`: (1, 3, height, width) float32 or float16, RGB, 0 to 1, the picture letterboxed: scaled to fit without
   changing its aspect ratio, in the middle, the rest 0.5 as in Darknet;
@@ -15,12 +16,13 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
 from standoff.core.errors import ModelError
+from standoff.core.finding import KEY as FINDS_WORKERS
 
 FORMAT_KEY: Final = "standoff_format"
 FORMAT: Final = "1"
@@ -41,12 +43,15 @@ class ModelCard:
         anchors_px: For each head its anchors' (width, height) in input pixels.
         input_size_px: (width, height).
         sources: SHA-256 of each file that the model was made from, by file name.
+        finds_workers: `height_px` of boxes in the input, rising, and the `share` of workers found at each; empty where
+            nobody measured it.
     """
 
     classes: tuple[str, ...]
     anchors_px: tuple[tuple[tuple[float, float], ...], ...]
     input_size_px: tuple[int, int]
     sources: Mapping[str, str]
+    finds_workers: Mapping[str, Sequence[float]] = field(default_factory=dict)
 
     def to_metadata(self) -> dict[str, str]:
         """Return the texts to put into the file's metadata."""
@@ -58,6 +63,8 @@ class ModelCard:
             "output": OUTPUT_COLUMNS,
             "sources": dict(self.sources),
         }
+        if self.finds_workers:
+            fields[FINDS_WORKERS] = dict(self.finds_workers)
         return {FORMAT_KEY: FORMAT, **{key: json.dumps(value) for key, value in fields.items()}}
 
     @classmethod
@@ -86,7 +93,7 @@ class ModelCard:
             found = f"format '{metadata[FORMAT_KEY]}'"
             raise ModelError(expected=f"model format {FORMAT} in {name}", found=found, fix=_FIX)
         try:
-            return cls._from_fields({key: json.loads(metadata[key]) for key in _FIELDS}, name)
+            return cls._from_fields({key: json.loads(metadata[key]) for key in _FIELDS if key in metadata}, name)
         except (AttributeError, KeyError, TypeError, ValueError) as error:
             raise ModelError(
                 expected=f"readable model metadata in {name}", found=f"{type(error).__name__}: {error}", fix=_FIX
@@ -103,10 +110,22 @@ class ModelCard:
             anchors_px=tuple(tuple((float(w), float(h)) for w, h in head) for head in fields["anchors_px"]),
             input_size_px=(width_px, height_px),
             sources={str(key): str(value) for key, value in fields["sources"].items()},
+            finds_workers=_rising(fields.get(FINDS_WORKERS, {})),
         )
 
 
-_FIELDS: Final = ("classes", "anchors_px", "input_size_px", "preprocessing", "sources")
+_FIELDS: Final = ("classes", "anchors_px", "input_size_px", "preprocessing", "sources", FINDS_WORKERS)
+
+
+def _rising(told: Mapping[str, Sequence[float]]) -> dict[str, tuple[float, ...]]:
+    if not told:
+        return {}
+    heights, shares = (tuple(float(value) for value in told[key]) for key in ("height_px", "share"))
+    if not 0 < len(heights) == len(shares) or list(heights) != sorted(set(heights)) or heights[0] <= 0.0:
+        raise ValueError(f"{FINDS_WORKERS} whose heights do not rise, or whose shares are another number")
+    if not all(0.0 <= share <= 1.0 for share in shares):
+        raise ValueError(f"{FINDS_WORKERS} with shares outside 0 to 1")
+    return {"height_px": heights, "share": shares}
 
 
 def file_sha256(path: Path) -> str:

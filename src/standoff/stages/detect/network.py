@@ -57,7 +57,7 @@ class Network:
         self._inputs = GraphInputs.of(self._session, path.name)
         self.warnings: tuple[str, ...] = ()
         if is_own:
-            self.interface = Interface("yolov3", card.classes, card.input_size_px)
+            self.interface = Interface("yolov3", card.classes, card.input_size_px, finds_workers=card.finds_workers)
             self._reader = self._own_reader()
             self._unreadable = self._own_unreadable
         else:

@@ -47,7 +47,7 @@ class View:
 
 
 def _starts_and_length(side_px: int, count: int, overlap: float) -> tuple[list[int], int]:
-    length_px = min(side_px, math.ceil(side_px / (count - (count - 1) * overlap)))
+    length_px = min(side_px, math.ceil(side_px * view_share((count, 1), overlap)[0]))
     return [(side_px - length_px) * number // max(1, count - 1) for number in range(count)], length_px
 
 
@@ -71,6 +71,16 @@ def views(frame_size_px: tuple[int, int], slices: tuple[int, int], overlap: floa
     lefts, width_px = _starts_and_length(frame_size_px[0], slices[0], overlap)
     tops, height_px = _starts_and_length(frame_size_px[1], slices[1], overlap)
     return whole, *(View(left, top, width_px, height_px, frame_size_px) for top in tops for left in lefts)
+
+
+def view_share(slices: tuple[int, int], overlap: float) -> tuple[float, float]:
+    """Return the parts of a frame's width and height that a slice shows.
+
+    >>> view_share((1, 1), 0.2), view_share((2, 1), 0.0)
+    ((1.0, 1.0), (0.5, 1.0))
+    """
+    across, up = (1.0 / (count - (count - 1) * overlap) for count in slices)
+    return across, up
 
 
 def held_whole_px(frame_size_px: tuple[int, int], slices: tuple[int, int], overlap: float) -> tuple[int, int]:

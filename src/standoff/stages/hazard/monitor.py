@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from standoff.core.homography import BoolArray
-from standoff.core.types import GroundMap, GroundPositions, Hazard, NoGroundMap, Proximities
+from standoff.core.types import GroundMap, GroundPositions, Hazard, NoGroundMap, Proximities, WatchedGround
 from standoff.core.zones import Zone
 from standoff.stages.hazard.absence import AbsenceWatch
 from standoff.stages.hazard.follow import FollowWatch
@@ -22,6 +22,10 @@ Pair = tuple[int, int]
 
 MAP_IS_BACK = "ground map is back"
 STREAM_ENDED = "end of stream"
+NOTHING_WATCHED = "no ground is watched"
+WATCHED_AGAIN = "ground is watched again"
+
+_NOBODY_JUDGED = WatchedGround()
 
 
 class HazardMonitor:
@@ -32,8 +36,8 @@ class HazardMonitor:
     that, and at the end of the stream for what only its last frames showed. What cannot be measured is
     never taken for safe: an open hazard becomes "unknown", a visible pair that stays unmeasured opens
     one of severity "unknown", and a stream without a ground map has one hazard of rule "measurement"
-    in place of one for each pair; where many sure detections are in no track, there is another one. Zones have
-    hazards of the same life (`ZoneRule`).
+    in place of one for each pair; where many sure detections are in no track, or hardly any of the ground is watched,
+    there is another one. Zones have hazards of the same life (`ZoneRule`).
 
     Args:
         params: Settings; the defaults when left out.
@@ -45,6 +49,7 @@ class HazardMonitor:
         self._given_zones = tuple(zones)
         self._map = AbsenceWatch(self._params, MAP_IS_BACK)
         self._follow = FollowWatch(self._params)
+        self._sight = AbsenceWatch(self._params, WATCHED_AGAIN)
         self._pairs: dict[Pair, Watch] = {}
         self._load = AlarmLoad()
         self._looked_s = math.inf
@@ -63,6 +68,7 @@ class HazardMonitor:
         proximities: Proximities,
         ground: GroundMap | NoGroundMap,
         unfollowed: BoolArray,
+        watched: WatchedGround = _NOBODY_JUDGED,
     ) -> tuple[Hazard, ...]:
         """Take one frame and return its events, the stream's own first, then by pair, then by zone.
 
@@ -72,9 +78,14 @@ class HazardMonitor:
             proximities: All configured pairs.
             ground: The frame's map, or why there is none.
             unfollowed: (K,) which of the frame's sure detections are in no track.
+            watched: Where a worker would be found.
         """
         no_map = (ground.reason or NOT_MEASURED) if isinstance(ground, NoGroundMap) else ""
-        events = [self._map.update(time_s, no_map), self._follow.update(time_s, unfollowed)]
+        events = [
+            self._map.update(time_s, no_map),
+            self._follow.update(time_s, unfollowed),
+            self._sight.update(time_s, "" if no_map else self._unseeing(watched)),
+        ]
         rare = time_s - self._looked_s > self._params.min_duration_s
         self._looked_s = time_s
         readings = _readings(proximities)
@@ -97,16 +108,24 @@ class HazardMonitor:
 
     def close(self, time_s: float) -> tuple[Hazard, ...]:
         """End the stream: close everything that is open."""
-        events = [self._map.end(time_s, STREAM_ENDED), self._follow.end(time_s, STREAM_ENDED)]
+        events = [one.end(time_s, STREAM_ENDED) for one in (self._map, self._follow, self._sight)]
         for pair in sorted(self._pairs):
             events += [self._pairs[pair].finish(time_s), self._pairs[pair].end(time_s, STREAM_ENDED)]
         self._map, self._pairs = AbsenceWatch(self._params, MAP_IS_BACK), {}
+        self._sight = AbsenceWatch(self._params, WATCHED_AGAIN)
         return _said(events + self._zones.end(time_s, STREAM_ENDED))
+
+    def _unseeing(self, watched: WatchedGround) -> str:
+        """Return why a worker would hardly be found anywhere; "" where there is ground enough that is watched."""
+        if not watched.judged or watched.share >= self._params.least_watched_share:
+            return ""
+        return ": ".join([NOTHING_WATCHED, *list(watched.unwatched)[:1]])
 
     def reset(self) -> None:
         """Forget everything without a word."""
         self._map = AbsenceWatch(self._params, MAP_IS_BACK)
         self._follow = FollowWatch(self._params)
+        self._sight = AbsenceWatch(self._params, WATCHED_AGAIN)
         self._pairs = {}
         self._load = AlarmLoad()
         self._looked_s = math.inf

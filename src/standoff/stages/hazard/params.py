@@ -68,6 +68,11 @@ class HazardParams:
     release_s: Annotated[float, Ge(0), Doc("The gap must be wide enough for so many seconds before a level ends.")] = (
         0.5
     )
+    least_watched_share: Annotated[
+        float,
+        Interval(ge=0, le=1),
+        Doc("Where less than this share of the ground in the picture is watched, that is said: silence is no safety."),
+    ] = 0.05
     update_every_s: Annotated[
         float, Ge(0), Doc("While a hazard lasts it is reported again every so many seconds, and at every change.")
     ] = 1.0

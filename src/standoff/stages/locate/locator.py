@@ -9,18 +9,13 @@ import numpy as np
 from standoff.core import homography
 from standoff.core.classes import CLASSES
 from standoff.core.homography import BoolArray, FloatArray
+from standoff.core.map_error import factor, map_jacobian
 from standoff.core.polygon import inside
 from standoff.core.types import GroundMap, GroundPositions, NoGroundMap, TextArray, Tracks
 from standoff.stages.locate import class_prior
 from standoff.stages.locate.ground_filter import GroundFilter
 from standoff.stages.locate.params import LocateParams
-from standoff.stages.locate.uncertainty import (
-    factor,
-    horizon_margin,
-    map_jacobian,
-    own_covariance,
-    relief_covariance,
-)
+from standoff.stages.locate.uncertainty import horizon_margin, own_covariance, relief_covariance
 
 CUT_OFF = "cut off by the picture's edge"
 OUTSIDE_LENS = "outside the lens model"

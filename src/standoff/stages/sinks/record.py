@@ -20,6 +20,7 @@ from standoff.core.types import FrameResult, GroundMap, Hazard, NoGroundMap, Out
 from standoff.files.json_text import json_text, plain, write_json
 from standoff.stages.sinks.durations import Durations
 from standoff.stages.sinks.scene import worse
+from standoff.stages.sinks.watched_shares import WatchedShares
 
 _LIBRARIES = ("numpy", "scipy", "numba", "opencv-python-headless", "onnxruntime", "av", "pyarrow")
 
@@ -73,6 +74,7 @@ class RecordSink:
         self._no_map: Counter[str] = Counter()
         self._map_methods: Counter[str] = Counter()
         self._invalid: Counter[str] = Counter()
+        self._watched = WatchedShares()
         self._hazard_severity: dict[str, Severity] = {}
         self._hazard_zone: dict[str, str] = {}
         self._live_tracks: set[int] = set()
@@ -90,6 +92,7 @@ class RecordSink:
         else:
             self._map_methods[result.ground.method] += 1
         self._invalid.update(result.positions.reason[~result.positions.valid].tolist())
+        self._watched.add(result.watched)
         self._count_hazards(result.hazards)
         for stage, duration_ms in result.stage_ms.items():
             self._stages[stage].add(duration_ms)
@@ -161,6 +164,7 @@ class RecordSink:
                     "no_ground_map": self._no_map,
                     "invalid_positions": self._invalid,
                 },
+                "watched_ground": self._watched.summary(),
                 "stages": {stage: durations.summary() for stage, durations in self._stages.items()},
                 "sink_errors": dict(outcome.sink_errors),
             }

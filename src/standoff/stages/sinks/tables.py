@@ -18,7 +18,7 @@ from standoff import __version__
 from standoff.clips import COLUMNS, FOOT_COLUMNS, metadata_of
 from standoff.core.classes import CLASSES
 from standoff.core.homography import BoolArray, FloatArray
-from standoff.core.types import FrameResult, GroundMap, IntArray, NoGroundMap, Outcome, TextArray
+from standoff.core.types import FrameResult, GroundMap, IntArray, NoGroundMap, Outcome, TextArray, WatchedGround
 from standoff.files.json_text import plain
 from standoff.stages.sinks.params import TableParams
 from standoff.stages.sinks.parquet_parts import Columns, ParquetParts
@@ -56,6 +56,7 @@ _TRACK_COLUMNS = (
     ("reason", pa.string(), "", "why not; empty where valid"),
     ("standing_s", pa.float64(), "s", "for how long it has not moved; null while unknown"),
     ("sight", pa.string(), "", "observed; hidden: looked for and not found; predicted: not looked for; unknown"),
+    ("around_watched", pa.float64(), "", "watched share of the circle about a machine; null: none, or no place"),
 )
 _ZONES_COLUMN = ("zones", pa.list_(pa.string()), "", "names of the zones that an open hazard of this track is about")
 _PROXIMITY_COLUMNS = (
@@ -89,6 +90,10 @@ _FRAMES_COLUMNS = (
     ("map_age_s", pa.float64(), "s", "since the map was last observed; null without a map"),
     ("scale_m_per_px", pa.float64(), "m/px", "Eq. 6's scale; null without a map"),
     ("image_to_ground", pa.list_(pa.float64()), "", "3 x 3, undistorted pixels to metres, row by row; null without"),
+    ("watched_share", pa.float64(), "", "part of the picture's ground where a worker would be found; null: not judged"),
+    ("unwatched_reason", pa.string(), "", "why most of the rest is not watched; null where all of it is"),
+    ("missed_share", pa.float64(), "", "of workers on watched ground, share missed in one picture; null: unknown"),
+    ("watched_cells", pa.list_(pa.int8()), "", "18 x 32, row by row: -1 no ground, 0 watched, else why not; or null"),
 )
 
 
@@ -160,10 +165,16 @@ def _track_rows(result: FrameResult) -> Columns:
         "cov_xy_m2": variance[:, 0, 1],
         "radius_m": positions.radius_m,
         "standing_s": positions.standing_s,
+        "around_watched": _around(result),
         "sight": _sight(result),
         "valid": positions.valid,
         "reason": positions.reason,
     }
+
+
+def _around(result: FrameResult) -> FloatArray:
+    around = result.watched.around
+    return around if len(around) == len(result.tracks) else np.full(len(result.tracks), np.nan)
 
 
 def _sight(result: FrameResult) -> TextArray:
@@ -225,12 +236,22 @@ def _map_values(ground: GroundMap | NoGroundMap) -> dict[str, Any]:
     }
 
 
+def _watched_values(watched: WatchedGround) -> dict[str, Any]:
+    return {
+        "watched_share": watched.share,
+        "unwatched_reason": next(iter(watched.unwatched), None),
+        "missed_share": watched.missed_share,
+        "watched_cells": watched.cells.ravel().tolist() if watched.judged else None,
+    }
+
+
 def _frame_rows(result: FrameResult) -> Columns:
     values = {
         "detected": result.detected,
         "detections": len(result.detections) if result.detected else None,
         "tracks": len(result.tracks),
         **_map_values(result.ground),
+        **_watched_values(result.watched),
     }
     return {**_frame_columns(result, 1), **{name: [value] for name, value in values.items()}}
 

@@ -8,6 +8,9 @@ from pathlib import Path
 
 import onnx
 
+from standoff.core.errors import DataError
+from standoff.core.finding import WorkerFinding
+from standoff.files.whole import whole_file
 from standoff.stages.detect.model_card import ModelCard, file_sha256
 from standoff.stages.detect.runtime import open_session
 
@@ -43,3 +46,29 @@ def describe_as_made_from(model: onnx.ModelProto, source: Path, **facts: object)
     texts |= {key: json.dumps(value) for key, value in facts.items()}
     del model.metadata_props[:]
     onnx.helper.set_model_props(model, texts)
+
+
+def tell_finding(path: Path, finding: WorkerFinding) -> None:
+    """Write into a model's file how small a worker it finds.
+
+    Args:
+        path: A model of ours; replaced as a whole.
+        finding: As measured.
+
+    Raises:
+        DataError: It was not measured.
+        ModelError: It is no model of ours.
+        OutputError: It cannot be written.
+    """
+    if not finding.measured:
+        raise DataError(
+            expected="at least 20 workers of about the same height, to know how many are found",
+            found="fewer",
+            fix="score more pictures",
+        )
+    model, card = read_own_model(path)
+    texts = {entry.key: entry.value for entry in model.metadata_props}
+    del model.metadata_props[:]
+    onnx.helper.set_model_props(model, texts | replace(card, finds_workers=finding.to_dict()).to_metadata())
+    with whole_file(path) as half_written:
+        onnx.save(model, str(half_written))

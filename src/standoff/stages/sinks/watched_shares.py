@@ -1,0 +1,56 @@
+"""How much of the ground was watched in a run, and why the rest was not."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any
+
+from standoff.core.types import WatchedGround
+
+
+class WatchedShares:
+    """Means over all frames that somebody judged.
+
+    Attributes:
+        frames: How many they are.
+    """
+
+    def __init__(self) -> None:
+        self.frames = 0
+        self._share = self._missed = 0.0
+        self._frames_watched = 0
+        self._unwatched: Counter[str] = Counter()
+
+    def add(self, watched: WatchedGround) -> None:
+        """Take a frame."""
+        if not watched.judged:
+            return
+        self.frames += 1
+        self._share += watched.share
+        self._unwatched.update(watched.unwatched)
+        if watched.watched.any():
+            self._missed += watched.missed_share
+            self._frames_watched += 1
+
+    @property
+    def share(self) -> float:
+        """Mean share of the ground that was watched; NaN without frames."""
+        return self._share / self.frames if self.frames else float("nan")
+
+    @property
+    def unwatched(self) -> dict[str, float]:
+        """Mean share of the ground by the reason why it was not, largest first."""
+        return {reason: total / self.frames for reason, total in self._unwatched.most_common()}
+
+    @property
+    def missed_share(self) -> float:
+        """Of the workers on watched ground, how many are missed in one picture; NaN where none was watched."""
+        return self._missed / self._frames_watched if self._frames_watched else float("nan")
+
+    def summary(self) -> dict[str, Any]:
+        """Return all of it for the record, to a tenth of a percent."""
+        return {
+            "share": round(self.share, 3),
+            "unwatched": {reason: round(share, 3) for reason, share in self.unwatched.items()},
+            "missed_share": round(self.missed_share, 3),
+        }

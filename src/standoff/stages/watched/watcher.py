@@ -1,0 +1,192 @@
+"""Say of every part of a picture whether a worker who stands there would be found."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, Final
+
+import numpy as np
+
+from standoff.core.finding import WorkerFinding
+from standoff.core.homography import BoolArray, FloatArray
+from standoff.core.roles import IS_EQUIPMENT
+from standoff.core.types import Frame, GroundMap, GroundPositions, NoGroundMap, Tracks
+from standoff.core.watched_ground import (
+    BEHIND_MACHINE,
+    BLURRED,
+    COLUMNS,
+    NO_CONTRAST,
+    NO_GROUND,
+    NO_MAP,
+    OUTSIDE_MAP,
+    ROWS,
+    TOO_DARK,
+    TOO_SMALL,
+    UNSURE_MAP,
+    WATCHED,
+    CellArray,
+    WatchedGround,
+    cell_middles_px,
+    cell_of,
+)
+from standoff.stages.watched.ground_cells import ground_cells
+from standoff.stages.watched.params import WatchedParams
+from standoff.stages.watched.quality import PictureQuality, picture_quality
+
+_PARTS: Final = (ROWS // 2, COLUMNS // 2)
+_FOOT_LEVEL: Final = 0.8
+"""Where a machine without a ground point stands in its box: what is higher up in the box may be behind it."""
+_MOST_PERCENT: Final = 90.0
+_OPAQUE_SHARE: Final = 0.2
+_RINGS: Final = 4
+_TIME_ROUNDING_S: Final = 1e-6
+
+
+class GroundWatcher:
+    """Judge the pictures of one stream.
+
+    Ground is watched where the map is sure, the picture is sharp, bright and clear enough, and a worker would be tall
+    enough for the detector. What else may hide a worker, a wall or a heap, nobody knows.
+
+    Args:
+        params: Settings; the defaults when left out.
+        finding: What the detector finds.
+        worker_radius_m: Action radius of a worker, which together with a machine's makes the circle about the machine.
+    """
+
+    def __init__(
+        self,
+        params: WatchedParams | None = None,
+        finding: WorkerFinding | None = None,
+        worker_radius_m: float = 2.0,
+    ) -> None:
+        self._params = params or WatchedParams()
+        self._finding = finding or WorkerFinding()
+        self._worker_radius_m = worker_radius_m
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the stream."""
+        self._judged_s = -math.inf
+        self._cells: CellArray = np.zeros((ROWS, COLUMNS), dtype=np.int8)
+        self._found: FloatArray = np.zeros((ROWS, COLUMNS))
+
+    @property
+    def description(self) -> Mapping[str, Any]:
+        """What is taken for granted of the detector, for the record."""
+        finding = self._finding
+        return {
+            "worker_height_px": finding.height_px,
+            "found_share": finding.share,
+            "measured": finding.measured,
+        }
+
+    def update(
+        self, frame: Frame, ground: GroundMap | NoGroundMap, tracks: Tracks, positions: GroundPositions
+    ) -> WatchedGround:
+        """Judge one frame.
+
+        Args:
+            frame: With its picture.
+            ground: The frame's map, or why there is none.
+            tracks: What is seen, machines among it.
+            positions: Of the tracks, row by row.
+        """
+        nothing = np.full((ROWS, COLUMNS), np.nan)
+        if isinstance(ground, NoGroundMap):
+            self._judged_s = -math.inf
+            cells = np.full((ROWS, COLUMNS), NO_MAP, dtype=np.int8)
+            return WatchedGround(cells, nothing, np.full(len(tracks), np.nan))
+        if frame.time_s - self._judged_s >= self._params.judge_every_s - _TIME_ROUNDING_S:
+            self._judge(frame, ground)
+            self._judged_s = frame.time_s
+        cells = self._cells.copy()
+        cells[self._behind_machines(tracks, frame.size_px) & (cells == WATCHED)] = BEHIND_MACHINE
+        around = self._around(cells, positions, ground, frame.size_px)
+        return WatchedGround(cells, np.where(cells == WATCHED, self._found, np.nan), around)
+
+    def _judge(self, frame: Frame, ground: GroundMap) -> None:
+        params, size_px = self._params, frame.size_px
+        asked = ground_cells(ground, size_px, params.stature_m)
+        self._found = self._finding.share_found(asked.height_px, size_px).reshape(ROWS, COLUMNS)
+        small_px = self._finding.picture_px_per_input_px(size_px)
+        dark, faint, blurred = self._unusable(picture_quality(frame.picture, *_PARTS), small_px)
+        causes = (
+            (~asked.is_ground, NO_GROUND),
+            (~asked.in_map, OUTSIDE_MAP),
+            (dark, TOO_DARK),
+            (faint, NO_CONTRAST),
+            (blurred, BLURRED),
+            (self._found < params.found_share, TOO_SMALL),
+            (~(asked.sigma_m <= params.largest_sigma_m), UNSURE_MAP),
+        )
+        self._cells = np.full((ROWS, COLUMNS), WATCHED, dtype=np.int8)
+        for affected, reason in reversed(causes):
+            self._cells[affected.reshape(ROWS, COLUMNS)] = reason
+
+    def _unusable(self, quality: PictureQuality, small_px: float) -> tuple[BoolArray, BoolArray, BoolArray]:
+        """Tell (ROWS, COLUMNS) where it is too dark, where there is no contrast and where the picture is blurred."""
+        params = self._params
+        contrast = quality.contrast / np.maximum(quality.brightness, 1.0)
+        # Even ground has little contrast of its own: what else there is beside it, and further away, which is above it
+        # in the picture, shows how clear the air is. Where there is next to none, something lies on the lens.
+        clear = np.maximum.accumulate(np.percentile(contrast, _MOST_PERCENT, axis=1))[:, None]
+        faint = (clear < params.least_contrast) | (contrast < _OPAQUE_SHARE * params.least_contrast)
+        signal = np.percentile(quality.contrast, _MOST_PERCENT)
+        dark = np.full_like(faint, signal < params.least_signal * quality.noise)
+        blurred = _usual_near(quality.blur_px) > params.largest_blur_px * small_px
+        return _finer(dark), _finer(faint), _finer(blurred)
+
+    @staticmethod
+    def _behind_machines(tracks: Tracks, size_px: tuple[int, int]) -> BoolArray:
+        machines = tracks[IS_EQUIPMENT[tracks.class_id]]
+        left, top, right, bottom = machines.xyxy_px.T[:, :, None]
+        foot_y = np.where(
+            np.isfinite(machines.foot_px[:, 1:]), machines.foot_px[:, 1:], top + _FOOT_LEVEL * (bottom - top)
+        )
+        x, y = cell_middles_px(size_px).T
+        behind = (x >= left) & (x <= right) & (y >= top) & (y <= np.minimum(foot_y, bottom))
+        return np.asarray(behind.any(axis=0).reshape(ROWS, COLUMNS))
+
+    def _around(
+        self, cells: CellArray, positions: GroundPositions, ground: GroundMap, size_px: tuple[int, int]
+    ) -> FloatArray:
+        """Return (M,) what share of the circle about each machine is watched."""
+        asked = positions.valid & IS_EQUIPMENT[positions.class_id]
+        around: FloatArray = np.full(len(positions), np.nan)
+        if not asked.any():
+            return around
+        radius_m = positions.radius_m[asked] + self._worker_radius_m
+        points_m = positions.xy_m[asked][:, None] + radius_m[:, None, None] * _DISC
+        points_px, seen = ground.to_image(points_m.reshape(-1, 2))
+        places, inside = cell_of(points_px, size_px)
+        watched = seen & inside & (cells[places[:, 0], places[:, 1]] == WATCHED)
+        around[asked] = watched.reshape(len(radius_m), -1).mean(axis=1)
+        return around
+
+
+def _disc() -> FloatArray:
+    """Return (N, 2) points that stand for equal parts of the unit circle: rings of 1, 6, 12, ... of them."""
+    points = [np.zeros((1, 2))]
+    for ring in range(1, _RINGS + 1):
+        turns = 2.0 * np.pi * np.arange(6 * ring) / (6 * ring)
+        points.append(np.column_stack([np.cos(turns), np.sin(turns)]) * ring / (_RINGS + 0.5))
+    return np.concatenate(points)
+
+
+_DISC: Final = _disc()
+
+
+def _finer(parts: BoolArray) -> BoolArray:
+    return np.kron(parts, np.ones((ROWS // parts.shape[0], COLUMNS // parts.shape[1]), dtype=np.bool_))
+
+
+def _usual_near(values: FloatArray) -> FloatArray:
+    """Return the median of the three by three parts about each; NaN, where none of them tells, as usual elsewhere."""
+    around = np.pad(values, 1, constant_values=np.nan)
+    windows = np.lib.stride_tricks.sliding_window_view(around, (3, 3)).reshape(*values.shape, 9)
+    known = np.isfinite(windows).any(axis=2)
+    usual = np.full(values.shape, np.nanmedian(values) if np.isfinite(values).any() else 0.0)
+    usual[known] = np.nanmedian(windows[known], axis=1)
+    return usual
