@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from standoff.core.errors import ConfigError
+from standoff.cli.numbers import pairs_of_folders
 
 
 def coverage(
@@ -34,13 +34,7 @@ def coverage(
     from standoff.cli.coverage_tables import coverage_tables
     from standoff.evaluation.coverage import evaluate_coverage
 
-    if len(folders) % 2:
-        raise ConfigError(
-            expected="pairs of folders, RUN CLIP RUN CLIP ...",
-            found=f"{len(folders)} folder{'s' * (len(folders) > 1)}",
-            fix="name the clip after each run",
-        )
-    runs = list(zip(folders[::2], folders[1::2], strict=True))
+    runs = pairs_of_folders(folders)
     with progress("reading", len(runs), unit="runs", quiet=len(runs) == 1) as on_run:
         result = evaluate_coverage(runs, on_run)
     if str(json_file) != "-":

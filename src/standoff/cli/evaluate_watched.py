@@ -1,0 +1,71 @@
+"""`standoff evaluate watched`: whether workers are found where the ground is called watched."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from standoff.cli.numbers import pairs_of_folders
+
+if TYPE_CHECKING:
+    from standoff.cli.console import Table
+    from standoff.evaluation.watched import Missed, WatchedResult
+
+
+def watched(
+    folders: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="RUN CLIP",
+            help="Folder of a run with its tables, and of the clip of `standoff simulate` that it is of; several pairs "
+            "of them are pooled.",
+            show_default=False,
+        ),
+    ],
+    json_file: Annotated[
+        Path | None, typer.Option("--json", help="Also write the result as JSON; - prints only that.")
+    ] = None,
+    markdown: Annotated[bool, typer.Option("--markdown", help="Print the tables in Markdown.")] = False,
+) -> None:
+    """Compare the ground that a run called watched with where workers truly were, and whether they were found."""
+    from standoff import __version__
+    from standoff.cli.console import print_tables, progress, write_json
+    from standoff.evaluation.watched import evaluate_watched
+
+    runs = pairs_of_folders(folders)
+    with progress("reading", len(runs), unit="runs", quiet=len(runs) == 1) as on_run:
+        result = evaluate_watched(runs, on_run)
+    if str(json_file) != "-":
+        print_tables([_table(result)], as_markdown=markdown)
+    if json_file is not None:
+        write_json({"standoff": __version__, **result.to_dict()}, json_file)
+
+
+def _table(result: WatchedResult) -> Table:
+    from standoff.cli.console import Table
+
+    rows: list[tuple[str, ...]] = [
+        ("on watched ground", *_cells(result.on_watched)),
+        ("  hidden by something", *_cells(result.on_watched_hidden)),
+        *((reason, *_cells(missed)) for reason, missed in result.on_unwatched.items()),
+    ]
+    caption = (
+        f"Workers in frames, whose feet are in the picture; hidden: less than half of them to be seen. "
+        f"{100 * result.watched_share:.0f} % of the ground in the pictures is called watched; of {result.findable} "
+        f"workers of heights of which nine of ten are found, {_percent(result.watched_of_findable)} stand on it. "
+        f"Of {result.breaches} in a breach, {result.breaches_called_clear} stand on watched ground and are called "
+        f"clear: {_percent(result.called_clear_share)}."
+    )
+    clips = len(result.clips)
+    title = f"Workers and watched ground: {clips} clip{'s' * (clips > 1)}, {result.frames} frames"
+    return Table(title, ("a worker stands", "workers", "missed", "%"), rows, caption)
+
+
+def _cells(missed: Missed) -> tuple[str, str, str]:
+    return str(missed.workers), str(missed.missed), _percent(missed.missed_share).removesuffix(" %")
+
+
+def _percent(share: float) -> str:
+    return "none" if share != share else f"{100 * share:.1f} %"
