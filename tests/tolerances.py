@@ -204,3 +204,12 @@ FISHEYE_REL = 0.012
 
 TRIALS_SHARE = 0.01
 """A share of 40 000 random trials: 0.0025 at the most, four of those."""
+
+BLUR_REL = 0.1
+"""Blur read off drawn edges: edges near each other add to it, and so do the pixels of the smaller picture."""
+
+NOISE_REL = 0.05
+"""Median of 15,000 second differences, rounded to grey levels, against the noise that was drawn."""
+
+STANDING_REL = 0.06
+"""A person seen in parallel against true perspective, from 12 m and more: his head is that much nearer."""

@@ -41,7 +41,6 @@ def _summary(comparison: Comparison) -> Table:
         ranges = (f"{one.low:.3f}-{one.high:.3f}" for one in comparison.chance.intervals)
         rows.insert(1, ("  95 % of it", *ranges))
     rows += _worker_rows(results)
-    rows.append(("worker found 9 times of 10 from", *(_found_from(result) for result in results)))
     rows += [
         ("ms a picture, median", *(_number(result.median_ms, 1) for result in results)),
         ("  19 of 20 within", *(_number(result.p95_ms, 1) for result in results)),
@@ -72,11 +71,6 @@ def _worker_rows(results: Sequence[TrialResult]) -> list[tuple[str, ...]]:
         for place, band in enumerate(_bands())
         if workers and workers[0].truths_by_height[place]
     ]
-
-
-def _found_from(result: TrialResult) -> str:
-    least_px = result.finding.least_height_px(0.9) if result.finding.measured else math.nan
-    return f"{least_px:.0f} px" if math.isfinite(least_px) else _NONE
 
 
 def _bands() -> list[str]:

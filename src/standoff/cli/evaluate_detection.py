@@ -56,9 +56,6 @@ def detection(
     json_file: Annotated[
         Path | None, typer.Option("--json", help="Also write the result as JSON; - prints only that.")
     ] = None,
-    write_finding: Annotated[
-        bool, typer.Option("--write-finding", help="Write into each model's file how small a worker it finds.")
-    ] = False,
     figure: Annotated[Path | None, typer.Option(help="Also draw precision-recall and accuracy-time to here.")] = None,
     markdown: Annotated[bool, typer.Option("--markdown", help="Print the tables in Markdown.")] = False,
 ) -> None:
@@ -91,19 +88,10 @@ def detection(
     # First what cannot fail: a mistyped path must not cost an hour of inference.
     if str(json_file) != "-":
         print_comparison(comparison, as_markdown=markdown)
-    if write_finding:
-        _write_findings(comparison)
     if json_file is not None:
         write_json(comparison.to_dict(), json_file)
     if figure is not None:
         write_figures(comparison, figure)
-
-
-def _write_findings(comparison: Comparison) -> None:
-    from standoff.training.quantization.onnx_file import tell_finding
-
-    for result in comparison.results:
-        tell_finding(result.candidate.model, result.finding)
 
 
 def _candidates(models: Sequence[Path], slices: Sequence[str]) -> list[Candidate]:

@@ -27,6 +27,10 @@ def watched(
     json_file: Annotated[
         Path | None, typer.Option("--json", help="Also write the result as JSON; - prints only that.")
     ] = None,
+    write_finding: Annotated[
+        Path | None,
+        typer.Option(help="Write into this model's file, which all runs must have used, how small a worker it finds."),
+    ] = None,
     markdown: Annotated[bool, typer.Option("--markdown", help="Print the tables in Markdown.")] = False,
 ) -> None:
     """Compare the ground that a run called watched with where workers truly were, and whether they were found."""
@@ -38,7 +42,11 @@ def watched(
     with progress("reading", len(runs), unit="runs", quiet=len(runs) == 1) as on_run:
         result = evaluate_watched(runs, on_run)
     if str(json_file) != "-":
-        print_tables([_table(result)], as_markdown=markdown)
+        print_tables([_table(result), _finding_table(result)], as_markdown=markdown)
+    if write_finding is not None:
+        from standoff.training.quantization.onnx_file import tell_finding
+
+        tell_finding(write_finding, result.finding)
     if json_file is not None:
         write_json({"standoff": __version__, **result.to_dict()}, json_file)
 
@@ -61,6 +69,17 @@ def _table(result: WatchedResult) -> Table:
     clips = len(result.clips)
     title = f"Workers and watched ground: {clips} clip{'s' * (clips > 1)}, {result.frames} frames"
     return Table(title, ("a worker stands", "workers", "missed", "%"), rows, caption)
+
+
+def _finding_table(result: WatchedResult) -> Table:
+    from standoff.cli.console import Table
+
+    finding = result.finding
+    pairs = zip(finding.height_px, finding.share, strict=True) if finding.measured else ()
+    rows: list[tuple[str, ...]] = [(f"{height_px:.0f} px", f"{100 * share:.0f} %") for height_px, share in pairs]
+    least_px = finding.least_height_px(0.9) if finding.measured else float("inf")
+    caption = f"Pixels of the detector's input. Nine of ten are found from {least_px:.0f} px."
+    return Table("Workers found by how tall they are, at least half to be seen", ("height", "found"), rows, caption)
 
 
 def _cells(missed: Missed) -> tuple[str, str, str]:

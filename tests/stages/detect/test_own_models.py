@@ -16,6 +16,7 @@ from stages.detect.onnx_models import Array, save_graph
 
 from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.errors import ModelError
+from standoff.core.finding import WorkerFinding
 from standoff.core.types import Frame
 from standoff.stages.detect import DetectParams, OnnxDetector
 from standoff.stages.detect.letterbox import Letterbox
@@ -168,3 +169,36 @@ def test_an_input_that_nobody_can_fill_is_refused(tmp_path: Path) -> None:
     model = _save_own(tmp_path / "m.onnx", np.zeros((1, 4, 8), np.float32), (64, 64), np.int64)
     with pytest.raises(ModelError, match=r"one input \(1, 3, height, width\) in m\.onnx, .* found picture .*int64"):
         OnnxDetector(model)
+
+
+def _card(path: Path, card: ModelCard) -> Path:
+    model = onnx.load(str(path))
+    onnx.helper.set_model_props(model, card.to_metadata())
+    onnx.save(model, str(path))
+    return path
+
+
+def test_a_file_tells_how_small_a_worker_it_finds_if_somebody_measured_it(tmp_path: Path) -> None:
+    path = _save_own(tmp_path / "m.onnx", np.zeros((1, 4, 8), np.float32), (64, 64))
+    assert not WorkerFinding.of_detector(OnnxDetector(path).description).measured
+    told = {"height_px": (10.0, 20.0), "share": (0.5, 0.9)}
+    _card(path, ModelCard(LABELS, (), (64, 64), {}, told))
+    detector = OnnxDetector(path, DetectParams(slices=(2, 1), slice_overlap=0.0))
+    finding = WorkerFinding.of_detector(detector.description)
+    assert finding == WorkerFinding((10.0, 20.0), (0.5, 0.9), (64, 64), (0.5, 1.0), measured=True)
+
+
+@pytest.mark.parametrize(
+    "told",
+    [
+        {"height_px": (20.0, 10.0), "share": (0.5, 0.9)},
+        {"height_px": (10.0, 20.0), "share": (0.5,)},
+        {"height_px": (10.0, 20.0), "share": (0.5, 1.2)},
+        {"height_px": (0.0, 20.0), "share": (0.5, 0.9)},
+        {"height_px": (10.0, 20.0)},
+    ],
+)
+def test_a_card_that_tells_nonsense_of_workers_is_refused(tmp_path: Path, told: dict[str, tuple[float, ...]]) -> None:
+    path = _save_own(tmp_path / "m.onnx", np.zeros((1, 4, 8), np.float32), (64, 64))
+    with pytest.raises(ModelError, match="readable model metadata"):
+        OnnxDetector(_card(path, ModelCard(LABELS, (), (64, 64), {}, told)))

@@ -17,6 +17,7 @@ from square_detector import SIZE_PX, draw_squares, write_data, write_detector
 from tolerances import HALF_WEIGHTS, INT8_SCORE
 
 from standoff.core.errors import DataError, ModelError, OutputError
+from standoff.core.finding import WorkerFinding
 from standoff.labels import LabelledData, LabelledPicture, Split, read_data
 from standoff.labels.site_classes import to_site_classes
 from standoff.stages.detect import DetectParams, OnnxDetector
@@ -28,6 +29,7 @@ from standoff.training.quantization import quantize
 from standoff.training.quantization.gate import LEAST_TRUTHS, ClassLoss, Loss
 from standoff.training.quantization.half_precision import store_half
 from standoff.training.quantization.int8 import Int8Network, Method
+from standoff.training.quantization.onnx_file import read_own_model, tell_finding
 from standoff.training.quantization.quantize import (
     QuantizationPlan,
     QuantizationRefused,
@@ -358,3 +360,14 @@ def test_a_real_network_is_halved_to_half_its_size(tmp_path: Path, shared_data: 
     assert (tmp_path / "half.onnx").stat().st_size < 0.53 * (tmp_path / "float.onnx").stat().st_size
     shutil.copy(tmp_path / "half.onnx", tmp_path / "copy.onnx")
     assert Network(tmp_path / "copy.onnx", "cpu", 1).interface.classes[0] == "person"
+
+
+def test_what_was_measured_of_workers_stands_in_the_file_and_goes_along(tmp_path: Path) -> None:
+    model = write_detector(tmp_path)
+    before, finding = read_own_model(model)[1], WorkerFinding((10.0, 20.0), (0.5, 0.9), measured=True)
+    tell_finding(model, finding)
+    assert read_own_model(model)[1] == replace(before, finds_workers={"height_px": (10.0, 20.0), "share": (0.5, 0.9)})
+    store_half(model, tmp_path / "half.onnx")
+    assert WorkerFinding.of_detector(OnnxDetector(tmp_path / "half.onnx").description).share == (0.5, 0.9)
+    with pytest.raises(DataError, match="20 workers"):
+        tell_finding(model, WorkerFinding())

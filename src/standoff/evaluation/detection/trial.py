@@ -12,12 +12,10 @@ import numpy as np
 
 from standoff.core.classes import CLASSES
 from standoff.core.errors import DataError
-from standoff.core.finding import KEY, WorkerFinding
 from standoff.core.homography import FloatArray
 from standoff.core.protocols import Detector
 from standoff.core.types import Detections
 from standoff.evaluation.detection.coco import MOST_OF_A_CLASS, CocoFigures, coco_figures
-from standoff.evaluation.detection.finding import measure_finding
 from standoff.evaluation.detection.grouping import Grouping
 from standoff.evaluation.detection.localisation import ale_by_class_m
 from standoff.evaluation.detection.material import Material
@@ -70,7 +68,6 @@ class TrialResult:
         ale_m: Paper Eq. 3 by class; empty without truth in metres.
         points: How well ground points lie; empty where the model tells none or the truth knows none.
         unseen: Scored classes that have truth and that the model does not know: their AP is 0.
-        finding: How small a worker it finds, in pixels of its input.
     """
 
     candidate: Candidate
@@ -81,7 +78,6 @@ class TrialResult:
     ale_m: Mapping[str, float]
     points: PointScores
     unseen: tuple[str, ...]
-    finding: WorkerFinding
 
     @property
     def median_ms(self) -> float:
@@ -106,7 +102,6 @@ class TrialResult:
             "coco": self.coco.to_dict(),
             "ale_m": dict(self.ale_m),
             "points": self.points.to_dict(),
-            KEY: self.finding.to_dict(),
         }
 
 
@@ -195,7 +190,6 @@ def try_candidate(
         ale_m=ale_by_class_m(score, material),
         points=score_points(score, material.views),
         unseen=_unseen(score, grouping, set(description["class_map"].values())),
-        finding=measure_finding(truth, found, grouping.classes, WorkerFinding.of_detector(description)),
     )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from standoff.core.classes import CLASSES
 from standoff.core.errors import DataError
+from standoff.core.finding import WorkerFinding
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import IntArray
 from standoff.core.watched_ground import COLUMNS, ROWS, cell_of
@@ -29,7 +30,9 @@ class WorkerSamples:
         clip: Folder.
         frames: That the run read.
         watched_share: Of the ground in the picture, mean of the frames.
+        detector: What it says of the workers that it finds.
         height_px: (N,) of the box of all of him.
+        input_height_px: (N,) the same in the detector's input.
         visible_share: (N,) of him that nothing hides.
         cell: (N,) what the run says of the ground there, as in `WatchedGround.cells`.
         found: (N,) whether a track shows him.
@@ -41,7 +44,9 @@ class WorkerSamples:
     clip: Path
     frames: int
     watched_share: float
+    detector: WorkerFinding
     height_px: FloatArray
+    input_height_px: FloatArray
     visible_share: FloatArray
     cell: IntArray
     found: BoolArray
@@ -70,11 +75,15 @@ def read_worker_samples(run: Path, clip: Path) -> WorkerSamples:
     cells = _cells(frames["watched_cells"], run)
     row = np.searchsorted(frames["frame"], truth["frame"][asked])
     in_breach, called_clear = _breaches(beside, run, clip)
+    detector = WorkerFinding.of_detector(beside.record.get("model") or {})
+    height_px = (truth["full_y2_px"] - truth["full_y1_px"])[asked]
     return WorkerSamples(
         clip=clip,
         frames=len(cells),
         watched_share=float(np.nanmean(frames["watched_share"])),
-        height_px=(truth["full_y2_px"] - truth["full_y1_px"])[asked],
+        detector=detector,
+        height_px=height_px,
+        input_height_px=height_px / detector.picture_px_per_input_px(beside.size_px),
         visible_share=truth["visible_share"][asked],
         cell=cells[row, place[asked, 0], place[asked, 1]],
         found=beside.track_row[asked] != NOTHING,

@@ -9,12 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from standoff.core.finding import KEY as FINDS_WORKERS
+from standoff.core.finding import WorkerFinding
 from standoff.core.homography import BoolArray
 from standoff.core.watched_ground import NO_GROUND, REASONS, WATCHED
+from standoff.evaluation.watched.finding import MOSTLY_SEEN, measure_finding
 from standoff.evaluation.watched.samples import WorkerSamples
 
-MOSTLY_SEEN = 0.5
-"""Workers of whom less can be seen are hidden by something, which no rule about the ground can know."""
 FINDABLE_SHARE = 0.9
 _BAND = 2.0**0.5
 _FEWEST = 10
@@ -59,6 +60,7 @@ class WatchedResult:
         findable_watched: Of these, so many stand on ground called watched.
         breaches: Workers in a breach, in frames.
         breaches_called_clear: Of these, so many stand on ground called watched while nothing is said, or the wrong.
+        finding: How many are found by their height, in pixels of the detector's input.
     """
 
     clips: tuple[Path, ...]
@@ -71,6 +73,7 @@ class WatchedResult:
     findable_watched: int
     breaches: int
     breaches_called_clear: int
+    finding: WorkerFinding
 
     @property
     def watched_of_findable(self) -> float:
@@ -85,7 +88,8 @@ class WatchedResult:
     def to_dict(self) -> dict[str, Any]:
         """Return everything as JSON types; NaN stays NaN."""
         return {
-            **asdict(self),
+            **{name: value for name, value in asdict(self).items() if name != "finding"},
+            FINDS_WORKERS: self.finding.to_dict(),
             "clips": [str(clip) for clip in self.clips],
             "missed_share": self.on_watched.missed_share,
             "watched_of_findable": self.watched_of_findable,
@@ -114,6 +118,7 @@ def score_watched(samples: Sequence[WorkerSamples]) -> WatchedResult:
         findable_watched=int((could & watched).sum()),
         breaches=int(breach.sum()),
         breaches_called_clear=int((clear & watched).sum()),
+        finding=measure_finding(samples),
     )
 
 

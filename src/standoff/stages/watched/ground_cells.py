@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from standoff.core import homography
+from standoff.core.errors import GroundError
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.map_error import factor, map_jacobian, picture_jacobian
 from standoff.core.polygon import inside
+from standoff.core.pose import view_from_homography
 from standoff.core.types import GroundMap
 from standoff.core.watched_ground import cell_middles_px
 
@@ -37,23 +40,37 @@ class GroundCells:
 def ground_cells(ground: GroundMap, size_px: tuple[int, int], stature_m: float) -> GroundCells:
     """Ask a map about every cell.
 
-    Of a worker H metres tall and D deep who is seen at an angle whose sine is s, H sqrt(1 - s^2) + D s metres across
-    the view are in the box, as in `standoff.stages.locate.class_prior`.
-
     Args:
         ground: The map.
         size_px: (width, height) of the picture.
         stature_m: Height of the worker.
     """
     points_px = ground.undistorted(cell_middles_px(size_px))
-    _, is_ground = homography.apply(ground.image_to_ground, points_px)
+    places_m, is_ground = homography.apply(ground.image_to_ground, points_px)
     is_ground = is_ground & np.isfinite(points_px).all(axis=1)
     height_px, sigma_m = np.full(len(points_px), np.nan), np.full(len(points_px), np.nan)
     seen_px = points_px[is_ground]
-    along_m, across_m = np.linalg.svd(picture_jacobian(ground, seen_px), compute_uv=False).T
-    sine = across_m / along_m
-    height_px[is_ground] = stature_m * (np.sqrt(1.0 - sine**2) + _DEPTH_PER_STATURE * sine) / across_m
+    height_px[is_ground] = _heights_px(ground, seen_px, places_m[is_ground], stature_m)
     moved_m = map_jacobian(ground, seen_px) @ factor(ground.covariance)
     sigma_m[is_ground] = np.linalg.svd(moved_m, compute_uv=False)[:, 0]
     in_map = inside(ground.valid_px, points_px) if len(ground.valid_px) else is_ground
     return GroundCells(is_ground, in_map, height_px, sigma_m)
+
+
+def _heights_px(ground: GroundMap, seen_px: FloatArray, places_m: FloatArray, stature_m: float) -> FloatArray:
+    """Return how tall workers appear: from feet to head, and of what is deep what the angle of the view s leaves, D s.
+
+    Without a camera the view is taken to be parallel, H sqrt(1 - s^2): right in the middle of the picture.
+    """
+    along_m, across_m = np.linalg.svd(picture_jacobian(ground, seen_px), compute_uv=False).T
+    sine = across_m / along_m
+    upright_px = stature_m * np.sqrt(1.0 - sine**2) / across_m
+    if ground.camera is not None:
+        with suppress(GroundError):
+            view = view_from_homography(ground.image_to_ground, ground.camera)
+            feet, heads = (
+                view.project(np.column_stack([places_m, np.full(len(places_m), z_m)])) for z_m in (0.0, stature_m)
+            )
+            upright_px = np.linalg.norm(heads - feet, axis=1)
+    heights_px: FloatArray = upright_px + stature_m * _DEPTH_PER_STATURE * sine / across_m
+    return heights_px

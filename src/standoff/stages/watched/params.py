@@ -31,7 +31,7 @@ class WatchedParams:
         float,
         Gt(0),
         Doc("Standard deviation of blur, in pixels of what the detector sees, above which a picture is blurred."),
-    ] = 2.8
+    ] = 2.4
     least_contrast: Annotated[
         float,
         Ge(0),

@@ -24,8 +24,9 @@ _LARGEST_WIDTH_PX: Final = 960
 _BLURRED_AGAIN_PX: Final = 1.0
 _EDGE_NOISES: Final = 6.0
 _LEAST_EDGE: Final = 6.0
-_LEAST_EDGE_SHARE: Final = 0.002
+_LEAST_EDGE_SHARE: Final = 0.0005
 _LEAST_LOSS: Final = 0.01
+_NEAR: Final = np.ones((3, 3), dtype=np.uint8)
 _RANGE_PERCENT: Final = (1.0, 99.0)
 _EVERY_PX: Final = 3
 _MEDIAN_OF_NORMAL: Final = 0.6745
@@ -88,7 +89,8 @@ def _blur(gray: Gray, smooth: Gray, noise: float, grid: tuple[int, int], axis: i
     # Every other line of those that run along the axis tells as much for half the time.
     lines = (slice(None, None, 2), slice(None)) if axis == 1 else (slice(None), slice(None, None, 2))
     before, after = (_squared_slopes(one[lines], axis) for one in (gray, smooth))
-    strong: Gray = (after > max(_LEAST_EDGE, _EDGE_NOISES * noise) ** 2).astype(np.float32)
+    steepest: Gray = cv2.dilate(after, _NEAR)
+    strong: Gray = ((after > max(_LEAST_EDGE, _EDGE_NOISES * noise) ** 2) & (after == steepest)).astype(np.float32)
     share, sharp, blunt = (_means(values, grid) for values in (strong, before * strong, after * strong))
     known = share >= _LEAST_EDGE_SHARE
     ratio = np.divide(sharp, blunt, out=np.full_like(sharp, np.nan), where=known)
