@@ -125,4 +125,4 @@ def test_the_command_line_can_switch_the_files_blur_off(call: Call, video: Path,
 
 def _last_picture(film: Path) -> bytes:
     with av.open(str(film)) as container:
-        return [frame.to_ndarray(format="gray") for frame in container.decode(video=0)][-1].tobytes()
+        return bytes([frame.to_ndarray(format="gray") for frame in container.decode(video=0)][-1].tobytes())

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import re
+from decimal import Decimal
 from fractions import Fraction
 
 import pytest
@@ -20,7 +21,7 @@ sigmas_m = st.floats(1e-3, 30.0)
 
 def _half_a_digit(text: str) -> Fraction:
     """Return how far off a number may be that was rounded to this text."""
-    return Fraction(1, 2) / 10 ** len(text.partition(".")[2])
+    return Fraction(f"0.{len(text.partition('.')[2]) * '0'}5")
 
 
 def test_every_unit_of_the_settings_is_there() -> None:
@@ -106,9 +107,9 @@ def test_feet_and_inches_are_read_in_every_spelling(feet: int, eighths: int, spe
 
 
 @given(st.decimals(0, 1000, places=3), st.sampled_from(["", "-", "+"]))
-def test_a_unit_behind_a_number_is_what_it_says(amount: object, sign: str) -> None:
-    factor = {"": 1, "m": 1, "cm": Fraction(1, 100), "mm": Fraction(1, 1000), "ft": FOOT_M, "'": FOOT_M,
-              "in": FOOT_M / 12, '"': FOOT_M / 12}  # fmt: skip
+def test_a_unit_behind_a_number_is_what_it_says(amount: Decimal, sign: str) -> None:
+    factor = {"": Fraction(1), "m": Fraction(1), "cm": Fraction(1, 100), "mm": Fraction(1, 1000)}
+    factor |= {"ft": FOOT_M, "'": FOOT_M, "in": FOOT_M / 12, '"': FOOT_M / 12}
     for unit, in_m in factor.items():
         read = TypedLength.read(f"{sign}{amount}{unit}")
         assert read.length_m == pytest.approx(float(Fraction(f"{sign}{amount}") * in_m), abs=1e-12)

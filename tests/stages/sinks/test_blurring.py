@@ -15,6 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from laws import examples
 from stages.sinks.fake_site import FakePicture, FakeSite
+from tolerances import ENCODED_LEVELS
 
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import CameraMotion, Detections, FrameResult, ImageArray, Outcome, Tracks
@@ -254,7 +255,7 @@ def test_the_encoded_film_shows_nobody_and_all_else(tmp_path: Path) -> None:
         with av.open(str(tmp_path / f"{name}.mp4")) as container:
             shown[name] = [frame.to_ndarray(format="bgr24") for frame in container.decode(video=0)][-1]
     near, inside = _inside(people + np.array([-40, -40, 40, 40])), _inside(people)
-    assert np.abs(shown[True].astype(int) - shown[False])[~near].mean() < 2.0
+    assert np.abs(shown[True].astype(int) - shown[False])[~near].mean() < ENCODED_LEVELS
     assert _detail(shown[True], inside) < 0.35 * _detail(shown[False], inside)
 
 

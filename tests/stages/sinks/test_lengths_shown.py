@@ -13,7 +13,7 @@ from pages import PageReader
 from stages.sinks.fake_site import FakeSite
 
 from standoff.core.lengths import FEET, METRES, LengthUnit
-from standoff.core.types import FrameResult, Outcome
+from standoff.core.types import FrameResult, ImageArray, Outcome
 from standoff.stages.sinks import Composer, DrawParams, ReportParams, ReportSink, ShowParams, VideoParams
 from standoff.stages.sinks.birdseye import BirdsEye
 from standoff.stages.sinks.charts import read_in, themed_figure
@@ -59,7 +59,12 @@ def test_the_panels_scale_bar_is_as_long_as_it_says(
     panel, text = np.zeros((PANEL[1], PANEL[0], 3), dtype=np.uint8), TextSprites()
     said: list[str] = []
     original = text.sprite
-    monkeypatch.setattr(text, "sprite", lambda word, *size, **how: (said.append(word), original(word, *size, **how))[1])
+
+    def sprite(word: str, size_px: int, *, bold: bool = False) -> ImageArray:
+        said.append(word)
+        return original(word, size_px, bold=bold)
+
+    monkeypatch.setattr(text, "sprite", sprite)
     birdseye = BirdsEye(PANEL, DrawParams(circles=False, labels=False, fans=False), text)
     sketch = Sketch.of(Scene.of(results[0], OpenHazards()), DrawParams(), unit)
     birdseye.draw(panel, results[0].frame.image, sketch)
@@ -101,7 +106,7 @@ def test_in_metres_axes_are_marked_as_matplotlib_does() -> None:
 def test_a_report_in_feet_has_no_metres_but_those_that_it_translates(
     tmp_path: Path, results: list[FrameResult]
 ) -> None:
-    pages = {unit: _page(tmp_path, results, ShowParams(unit=unit)) for unit in ("metres", "feet")}  # type: ignore[arg-type]
+    pages = {unit: _page(tmp_path, results, ShowParams(unit=unit)) for unit in ("metres", "feet")}
     said = {name: PageReader.of(page).text.partition("How it was made")[0] for name, page in pages.items()}
     assert re.findall(r"[\d.]+ m\b", said["feet"]) == ["2.89 m"]
     assert "rest on a square reference of 2.89 m (9.5 ft)" in said["feet"]
@@ -123,7 +128,7 @@ def test_the_film_differs_in_its_words_only(results: list[FrameResult]) -> None:
     scene = Scene.of(results[0], OpenHazards())
     image = results[0].frame.image
     first, other = (
-        Composer((320, 180), plain, ShowParams(unit=name)).compose(cv2.resize(image, (320, 180)), scene).copy()  # type: ignore[arg-type]
+        Composer((320, 180), plain, ShowParams(unit=name)).compose(cv2.resize(image, (320, 180)), scene).copy()
         for name in ("metres", "feet")
     )
     np.testing.assert_array_equal(first, other)
