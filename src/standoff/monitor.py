@@ -206,7 +206,7 @@ def build_sinks(
             settings.tables,
         ),
         "hazards": lambda: HazardSink(folder / "hazards.jsonl"),
-        "video": lambda: VideoSink(folder / "annotated.mp4", settings.video, zones),
+        "video": lambda: VideoSink(folder / "annotated.mp4", settings.video, zones, settings.show),
         "report": lambda: ReportSink(
             folder / "report.html",
             settings.report,
@@ -215,6 +215,7 @@ def build_sinks(
             at_close=at_close,
             checked=checked,
             zones=zones,
+            show=settings.show,
         ),
     }
     return {name: makers[name]() for name in settings.outputs}

@@ -53,8 +53,8 @@ def test_a_bad_source_is_one_line_exit_2_and_no_folder(
     [
         (("--ground", "square:nonsense"), "--ground square:SIDE"),
         (("--ground", "square:-1"), "square_m"),
-        (("--ground", "polygon:0,0,2,0,1"), "6 numbers with commas for --ground polygon:X,Y"),
-        (("--ground", "polygon:0,0,2,0,1,1,1"), "8 numbers with commas"),
+        (("--ground", "polygon:0,0,2,0,1"), "6 lengths with commas for --ground polygon:X,Y"),
+        (("--ground", "polygon:0,0,2,0,1,1,1"), "8 lengths with commas"),
         (("--ground", "polygon:0,0,1,1,1,0,0,1"), "cross each other"),
         (("--ground", "regular:2,1.5"), "3 to 12 corners"),
         (("--reference-box", "1,2,3"), "4 numbers"),

@@ -6,7 +6,7 @@ import pytest
 import yaml
 from cli.calling import Call
 
-from standoff.cli.run import _ground_overrides
+from standoff.cli.ground_option import GroundOption
 from standoff.config import build_ground, build_marker_observer, load_settings
 from standoff.core.errors import ConfigError
 
@@ -49,19 +49,19 @@ def test_an_existing_file_is_not_replaced(call: Call, tmp_path: Path) -> None:
 def test_the_command_lines_marker_defines_the_site_frame_and_replaces_other_grounds(tmp_path: Path) -> None:
     file = tmp_path / "site.yaml"
     file.write_text("ground: {survey: survey.yaml, markers: [{id: 9, size_m: 1, x_m: 4, y_m: 2}]}\n", encoding="utf-8")
-    settings = load_settings(file, {"ground": _ground_overrides("marker:1.2,id=3", None, None)})
+    settings = load_settings(file, {"ground": GroundOption("marker:1.2,id=3", None, None).settings})
     assert settings.ground.survey is None
     (marker,) = settings.ground.markers
     place = marker.place()
     assert (place.marker_id, place.corners_m.tolist()[:2]) == (3, [[0.0, 0.0, 0.0], [1.2, 0.0, 0.0]])
     assert build_marker_observer(settings) is not None
-    assert load_settings(file, {"ground": _ground_overrides("none", None, None)}).ground.markers == ()
+    assert load_settings(file, {"ground": GroundOption("none", None, None).settings}).ground.markers == ()
 
 
 @pytest.mark.parametrize("text", ["marker:", "marker:x", "marker:1.2,id", "marker:1.2,id=-1", "marker:1.2,size=3"])
 def test_a_marker_that_cannot_be_read_is_refused(text: str) -> None:
     with pytest.raises(ConfigError, match="marker:SIZE"):
-        _ground_overrides(text, None, None)
+        GroundOption(text, None, None)
 
 
 @pytest.mark.parametrize(
@@ -96,6 +96,6 @@ def test_what_the_paper_s_method_does_not_read_is_refused_not_ignored(tmp_path: 
 def test_the_command_line_s_auto_keeps_the_file_s_markers_and_none_ends_all_measuring(tmp_path: Path) -> None:
     file = tmp_path / "site.yaml"
     file.write_text("ground: {auto: false, markers: [{id: 9, size_m: 1}]}\n", encoding="utf-8")
-    auto = load_settings(file, {"ground": _ground_overrides("auto", None, None)}).ground
-    none = load_settings(file, {"ground": _ground_overrides("none", None, None)}).ground
+    auto = load_settings(file, {"ground": GroundOption("auto", None, None).settings}).ground
+    none = load_settings(file, {"ground": GroundOption("none", None, None).settings}).ground
     assert (auto.auto, len(auto.markers), none.auto, len(none.markers)) == (True, 1, False, 0)

@@ -18,94 +18,6 @@ if TYPE_CHECKING:
     from standoff.monitor import Run
 
 
-_SHAPES = {"square": "SIDE", "rectangle": "LENGTH,WIDTH", "regular": "SIDES,LENGTH", "polygon": "X,Y,X,Y,X,Y,..."}
-"""How `--ground` names the shapes of reference objects, and what has to follow."""
-
-
-def _numbers(text: str, count: int, option: str) -> tuple[float, ...]:
-    try:
-        numbers = tuple(float(part) for part in text.split(","))
-    except ValueError:
-        numbers = ()
-    if len(numbers) != count:
-        raise ConfigError(
-            expected=f"{count} number{'s with commas' * (count > 1)} for {option}",
-            found=repr(text),
-            fix=f"write for example {','.join(['10', '20', '30', '40'][:count])}",
-        )
-    return numbers
-
-
-def _shape_overrides(ground: str) -> dict[str, Any] | None:
-    """Translate a reference object's shape, with `,height=H` or without, into settings; None if it is none."""
-    kind, _, rest = ground.partition(":")
-    if kind not in _SHAPES:
-        return None
-    lengths, _, height = rest.partition(",height=")
-    option = f"--ground {kind}:{_SHAPES[kind]}"
-    # The file's reference may have another shape; its box and method go on.
-    shape: dict[str, Any] = dict.fromkeys(
-        ("square_m", "rectangle_m", "regular_m", "sides_m", "diagonal_m", "corners_m", "height_m")
-    )
-    if kind == "polygon":
-        pairs = max((lengths.count(",") + 2) // 2, 3)
-        numbers = _numbers(lengths, 2 * pairs, option)
-        shape["corners_m"] = tuple(zip(numbers[::2], numbers[1::2], strict=True))
-    elif kind == "square":
-        shape["square_m"] = _numbers(lengths, 1, option)[0]
-    else:
-        shape[f"{kind}_m"] = _numbers(lengths, 2, option)
-    if height:
-        shape["height_m"] = _numbers(height, 1, f"{option},height=H")[0]
-    return shape
-
-
-def _marker_override(text: str) -> dict[str, Any]:
-    """Read `marker:SIZE` or `marker:SIZE,id=ID` into settings of the only marker, which defines the site frame."""
-    size, *words = text.removeprefix("marker:").split(",")
-    size_m = _numbers(size, 1, "--ground marker:SIZE")[0]
-    marker: dict[str, Any] = {"size_m": size_m}
-    for word in words:
-        name, _, value = word.strip().partition("=")
-        if name != "id" or not value.isdecimal() or len(words) > 1:
-            raise ConfigError(
-                expected="--ground marker:SIZE or marker:SIZE,id=ID",
-                found=repr(text),
-                fix="write for example marker:1.2,id=3",
-            )
-        marker["id"] = int(value)
-    return {"markers": [marker], "survey": None, "reference": None}
-
-
-def _ground_overrides(ground: str | None, box: str | None, camera: Path | None) -> dict[str, Any]:
-    """Translate `--ground`, `--reference-box` and `--camera` into settings."""
-    overrides: dict[str, Any] = {}
-    if ground is not None and ground.startswith("marker:"):
-        overrides |= _marker_override(ground)
-        overrides["auto"] = True
-    elif ground in ("auto", "none"):
-        overrides |= {"survey": None, "reference": None, "auto": ground == "auto"}
-    elif ground is not None:
-        shape = _shape_overrides(ground)
-        overrides |= {"survey": None if shape else ground, "reference": shape}
-    if ground not in (None, "auto"):
-        # What the command line names is the ground; the file's markers may lie in another frame.
-        overrides.setdefault("markers", [])
-        overrides["more_references"] = []
-    if box is not None:
-        overrides.setdefault("reference", {})
-        if overrides["reference"] is None:
-            raise ConfigError(
-                expected="--reference-box together with a reference object",
-                found=f"--ground {ground}",
-                fix="use --ground square:SIDE, or describe the reference in the settings file",
-            )
-        overrides["reference"]["box_px"] = _numbers(box, 4, "--reference-box")
-    if camera is not None:
-        overrides["camera"] = str(camera)
-    return overrides
-
-
 def detector_overrides(model: str | None, detections: Path | None) -> dict[str, Any]:
     """Translate `--model` and `--detections` into settings; either wins over what a settings file says of both.
 
@@ -134,9 +46,10 @@ def run(
         str | None,
         typer.Option(
             help="square:SIDE, rectangle:LENGTH,WIDTH, regular:SIDES,LENGTH (3 to 12 sides of this length) or "
-            "polygon:X,Y,X,Y,X,Y,... (corners in order): a reference object, m; ,height=H where its top is so high "
-            "above the ground. Or marker:SIZE[,id=ID] (a printed marker, black square in m), survey.yaml (surveyed "
-            "points), auto (the default: markers of the settings, the drone's telemetry, sizes of people), or none."
+            "polygon:X,Y,X,Y,X,Y,... (corners in order): a reference object, in m or with units (2.89m, 9.5ft, "
+            "9'6\"); ,height=H where its top is so high above the ground. Or marker:SIZE[,id=ID] (a printed marker, "
+            "side of its black square), survey.yaml (surveyed points), auto (the default: markers of the settings, the "
+            "drone's telemetry, sizes of people), or none."
         ),
     ] = None,
     reference_box: Annotated[
@@ -158,6 +71,13 @@ def run(
         str | None,
         typer.Option(help="What to write, with commas: tracks,proximity,frames,detections,hazards,video,report."),
     ] = None,
+    unit: Annotated[
+        str | None, typer.Option(help="metres or feet: what film, report and this console say lengths in.")
+    ] = None,
+    blur: Annotated[
+        bool | None,
+        typer.Option("--blur/--no-blur", help="Make people unrecognisable in film and report.", show_default=False),
+    ] = None,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace an earlier run's files in the folder.")
     ] = False,
@@ -165,7 +85,9 @@ def run(
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
 ) -> None:
     """Monitor a video: distances in metres, hazards, an annotated film and a report."""
+    from standoff.cli.ground_option import GroundOption
     from standoff.config import load_settings
+    from standoff.core.lengths import UNITS
     from standoff.monitor import open_run
 
     plain = {
@@ -180,12 +102,18 @@ def run(
     }
     overrides: dict[str, Any] = {name: value for name, value in plain.items() if value is not None}
     overrides |= detector_overrides(model, detections)
-    if ground_overrides := _ground_overrides(ground, reference_box, camera):
-        overrides["ground"] = ground_overrides
-    opened = open_run(source, out, load_settings(config, overrides), overwrite=overwrite)
+    if shown := {name: value for name, value in {"unit": unit, "blur": blur}.items() if value is not None}:
+        overrides["show"] = shown
+    of_ground = GroundOption(ground, reference_box, camera)
+    if of_ground.settings:
+        overrides["ground"] = of_ground.settings
+    settings = load_settings(config, overrides)
+    of_ground.check_units(settings.show.unit)
+    said = UNITS[settings.show.unit].said
+    opened = open_run(source, out, settings, overwrite=overwrite)
     known = opened.warnings
     for warning in known:
-        typer.echo(f"standoff: warning: {warning}", err=True)
+        typer.echo(f"standoff: warning: {said(warning)}", err=True)
     try:
         watch(opened, quiet=quiet)
     except StandoffError:
@@ -194,7 +122,7 @@ def run(
         raise
     for warning in opened.warnings:
         if warning not in known:
-            typer.echo(f"standoff: warning: {warning}", err=True)
+            typer.echo(f"standoff: warning: {said(warning)}", err=True)
     tell(opened, as_json=as_json, quiet=quiet)
     raise typer.Exit(exit_status(opened))
 
@@ -244,6 +172,7 @@ def watch(opened: Run, *, quiet: bool, on_result: Callable[[FrameResult], None] 
 def tell(ended: Run, *, as_json: bool, quiet: bool) -> None:
     """Print the record, or a summary of it."""
     from standoff.cli.console import print_table, write_json
+    from standoff.core.lengths import UNITS
 
     record = ended.record
     if as_json:
@@ -262,7 +191,8 @@ def tell(ended: Run, *, as_json: bool, quiet: bool) -> None:
             ),
             ("frames a second", f"{record['frames_per_s']}"),
         ]
-        rows += [(f"no map: {reason}", f"{number}") for reason, number in counts["no_ground_map"].items()]
+        said = UNITS[record["settings"]["show"]["unit"]].said
+        rows += [(f"no map: {said(reason)}", f"{number}") for reason, number in counts["no_ground_map"].items()]
         rows += [(f"output {name} failed", message) for name, message in record["sink_errors"].items()]
         print_table(f"{record['status']}: {ended.folder}", ("", ""), rows, record["message"], texts=2)
 

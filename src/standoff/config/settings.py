@@ -18,7 +18,7 @@ from standoff.stages.hazard import HazardParams
 from standoff.stages.locate import LocateParams
 from standoff.stages.motion import MotionParams
 from standoff.stages.proximity import ProximityParams
-from standoff.stages.sinks import ReportParams, TableParams, VideoParams
+from standoff.stages.sinks import ReportParams, ShowParams, TableParams, VideoParams
 from standoff.stages.track import TrackParams
 from standoff.stages.watched import WatchedParams
 
@@ -221,6 +221,7 @@ class Settings(BaseSettings):
     hazard: Annotated[HazardParams, Field(description="From distances to warnings.")] = HazardParams()
     outputs: Annotated[tuple[OutputName, ...], Field(description="What is written beside run.json.")] = OUTPUT_NAMES
     tables: Annotated[TableParams, Field(description="The Parquet tables.")] = TableParams()
+    show: Annotated[ShowParams, Field(description="How people read lengths and see people.")] = ShowParams()
     video: Annotated[VideoParams, Field(description="The annotated video.")] = VideoParams()
     report: Annotated[ReportParams, Field(description="The report.")] = ReportParams()
     replace: Annotated[dict[StageName, Replacement], Field(description="Stages of your own.")] = {}

@@ -11,6 +11,7 @@ import pytest
 from pages import PageReader, without_pictures
 from stages.sinks.fake_site import FakeSite
 
+from standoff.core.lengths import METRES
 from standoff.core.types import FrameResult, Hazard, NoGroundMap, Outcome
 from standoff.stages.sinks import ReportParams, ReportSink
 from standoff.stages.sinks.charts import clock
@@ -190,7 +191,7 @@ def test_a_worst_moment_shows_its_pair(results: list[FrameResult]) -> None:
     for result in results[:30]:
         summary.add(result)
     for moment in summary.moments.worth_showing(100.0):
-        picture = cv2.imdecode(np.frombuffer(moment.jpeg(), np.uint8), cv2.IMREAD_COLOR)
+        picture = cv2.imdecode(np.frombuffer(moment.jpeg(METRES), np.uint8), cv2.IMREAD_COLOR)
         assert picture is not None
         assert picture.shape[1] >= 800
         left, top, right, bottom = moment.region_px

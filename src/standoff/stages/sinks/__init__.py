@@ -2,7 +2,7 @@
 
 from standoff.stages.sinks.folder import OUTPUT_FILES, prepare_output
 from standoff.stages.sinks.hazards import HazardSink
-from standoff.stages.sinks.params import DrawParams, ReportParams, TableParams, VideoParams
+from standoff.stages.sinks.params import DrawParams, ReportParams, ShowParams, TableParams, VideoParams
 from standoff.stages.sinks.record import RecordSink
 from standoff.stages.sinks.report import ReportSink
 from standoff.stages.sinks.tables import (
@@ -29,6 +29,7 @@ __all__ = [
     "RecordSink",
     "ReportParams",
     "ReportSink",
+    "ShowParams",
     "Table",
     "TableParams",
     "TableSink",

@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 
 from standoff.core.homography import BoolArray, FloatArray
+from standoff.core.lengths import LengthUnit
 from standoff.core.types import GroundMap, ImageArray, NoGroundMap
 from standoff.stages.sinks.fans import FAN_OPACITY
 from standoff.stages.sinks.ground_window import GroundWindow, camera_up, rectify, seen_ground_m, window_around
@@ -21,7 +22,6 @@ _OUTSIDE_FOR_S = 2.0
 _DIMMED = 0.72
 _ANGLES = np.linspace(0.0, 2.0 * np.pi, 49)
 _CIRCLE = np.column_stack([np.cos(_ANGLES), np.sin(_ANGLES)])
-_SCALE_STEPS_M = np.array([0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000])
 
 
 class BirdsEye:
@@ -63,7 +63,7 @@ class BirdsEye:
         rectify(picture, scene.ground, self._window, panel)
         cv2.convertScaleAbs(panel, dst=panel, alpha=_DIMMED)
         _draw_axes(painter, self._window)
-        _draw_scale_bar(painter, panel, self._window)
+        _draw_scale_bar(painter, panel, self._window, sketch.unit)
         window = self._window
         zones = ZoneDrawing(scene, lambda rings_m: [window.to_window(ring) for ring in rings_m], window.size_px)
         zones.draw(painter)
@@ -135,16 +135,15 @@ def _write_centred(painter: Painter, panel: ImageArray, lines: tuple[str, ...]) 
         painter.label(text, [corner], accent=bgr("danger") if row == 0 else None, bold=row == 0)
 
 
-def _draw_scale_bar(painter: Painter, panel: ImageArray, window: GroundWindow) -> None:
+def _draw_scale_bar(painter: Painter, panel: ImageArray, window: GroundWindow, unit: LengthUnit) -> None:
     height, width = panel.shape[:2]
-    longest_m = 0.4 * width * window.m_per_px
-    length_m = float(_SCALE_STEPS_M[max(0, np.searchsorted(_SCALE_STEPS_M, longest_m, side="right") - 1)])
+    length_m, text = unit.bar(0.4 * width * window.m_per_px)
     margin = painter.font_px
     left, right, bottom = margin, margin + length_m / window.m_per_px, height - margin
     tick = painter.font_px / 3
     bar = np.array([[left, bottom - tick], [left, bottom], [right, bottom], [right, bottom - tick]])
     painter.cased_line(bar, bgr("light"))
-    painter.label(f"{length_m:g} m", [(left, bottom - tick - painter.label_size_px("0")[1] - 3)])
+    painter.label(text, [(left, bottom - tick - painter.label_size_px("0")[1] - 3)])
 
 
 def _draw_axes(painter: Painter, window: GroundWindow) -> None:

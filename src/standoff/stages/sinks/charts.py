@@ -12,13 +12,15 @@ import cv2
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Outline
-from matplotlib.ticker import FuncFormatter, MaxNLocator
+from matplotlib.ticker import AutoLocator, FuncFormatter, MaxNLocator, ScalarFormatter
 
 from standoff.core.homography import FloatArray
+from standoff.core.lengths import LengthUnit
 from standoff.core.types import ImageArray
 from standoff.core.zones import Zone, ZoneKind, ring_middle
 from standoff.stages.sinks.collect import RunSummary
@@ -71,6 +73,40 @@ def clock(time_s: float, _position: object = None) -> str:
     return f"{int(minutes)}:{seconds:04.1f}"
 
 
+class _RoundIn(AutoLocator):
+    """Ticks of an axis in metres where another unit has round numbers."""
+
+    def __init__(self, unit: LengthUnit) -> None:
+        super().__init__()
+        self._in_m = unit.in_m
+
+    def tick_values(self, vmin: float, vmax: float) -> list[float]:
+        """Return their places."""
+        return [value * self._in_m for value in super().tick_values(vmin / self._in_m, vmax / self._in_m)]
+
+
+class _WrittenIn(ScalarFormatter):
+    """Numbers of an axis in metres, in another unit."""
+
+    def __init__(self, unit: LengthUnit) -> None:
+        super().__init__(useOffset=False)
+        self._in_m = unit.in_m
+
+    def set_locs(self, locs: list[float]) -> None:
+        """Take all places that are going to be written at."""
+        super().set_locs([place / self._in_m for place in locs])
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        return super().__call__(x / self._in_m, pos)
+
+
+def read_in(axis: Axis, unit: LengthUnit, what: str) -> None:
+    """Let an axis whose data are in metres be read in a unit; what is drawn on it stays in metres."""
+    axis.set_major_locator(_RoundIn(unit))
+    axis.set_major_formatter(_WrittenIn(unit))
+    axis.set_label_text(f"{what}, {unit.symbol}")
+
+
 @contextmanager
 def themed_figure(width_in: float, height_in: float) -> Iterator[Figure]:
     """Give a figure in the report's style; draw on it and call `inline_svg` before leaving."""
@@ -100,7 +136,7 @@ def site_chart(summary: RunSummary, warning_gap_m: float) -> str:
             axes.plot(series.column("time_s"), series.column("gap_m"), color=MUTED, alpha=0.45, linewidth=0.7)
         _shade_unmeasured(axes, summary.site, summary.no_map)
         _plot_by_limit(axes, summary.site, "gap_m", 0.0, warning_gap_m)
-        axes.set_ylabel("gap of the closest pair, m")
+        read_in(axes.yaxis, summary.unit, "gap of the closest pair")
         highest = np.nanmax(summary.site.column("gap_m")) if summary.site.closest else 0.0
         axes.set_ylim(top=max(1.15 * highest, warning_gap_m + 8.0))
         _finish_time_axis(axes, summary)
@@ -123,7 +159,7 @@ def pair_charts(summary: RunSummary, warning_gap_m: float) -> str:
             _shade_unmeasured(axes, series, series)
             _plot_by_limit(axes, series, "distance_m", both_radii_m, both_radii_m + warning_gap_m)
             axes.set_title(" and ".join(summary.pair_names[pair]), loc="left", fontsize=9, fontweight="bold")
-            axes.set_ylabel("distance, m")
+            read_in(axes.yaxis, summary.unit, "distance")
             axes.set_ylim(bottom=0)
             _finish_time_axis(axes, summary)
         return inline_svg(figure)
@@ -149,8 +185,8 @@ def plan_chart(summary: RunSummary) -> str:
         axes.set_xlim(low[0], high[0])
         axes.set_ylim(low[1], high[1])
         axes.set_aspect("equal")
-        axes.set_xlabel("x, m")
-        axes.set_ylabel("y, m")
+        read_in(axes.xaxis, summary.unit, "x")
+        read_in(axes.yaxis, summary.unit, "y")
         axes.grid(True)
         return inline_svg(figure)
 

@@ -8,10 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from standoff.core.lengths import UNITS
 from standoff.core.types import Frame, FrameResult, GroundMap, Hazard, ImageArray, NoGroundMap, Severity
 from standoff.core.zones import Zone
+from standoff.stages.sinks.blurring import PeopleWatch, blur
 from standoff.stages.sinks.moments import WorstMoments
-from standoff.stages.sinks.params import ReportParams
+from standoff.stages.sinks.params import ReportParams, ShowParams
 from standoff.stages.sinks.scene import OpenHazards, Pair, Scene, worse
 from standoff.stages.sinks.series import Path, Series
 
@@ -72,10 +74,13 @@ class RunSummary:
     Args:
         params: How much of each is kept.
         zones: Of the site.
+        show: The unit of lengths, and whether people are made unrecognisable.
     """
 
-    def __init__(self, params: ReportParams, zones: tuple[Zone, ...] = ()) -> None:
-        self.zones = zones
+    def __init__(self, params: ReportParams, zones: tuple[Zone, ...] = (), show: ShowParams | None = None) -> None:
+        show = show or ShowParams()
+        self.zones, self.unit, self.is_blurred = zones, UNITS[show.unit], show.blur
+        self._people = PeopleWatch(wanted=show.blur)
         self._most_pairs = params.pairs
         self._open = OpenHazards()
         self._live_tracks: set[int] = set()
@@ -102,9 +107,9 @@ class RunSummary:
             self.first_s, self.stream_id, self.size_px = frame.time_s, frame.stream_id, frame.size_px
         self.last_s = frame.time_s
         self._open.update(result.hazards)
-        scene = Scene.of(result, self._open, self.zones)
+        scene = Scene.of(result, self._open, self.zones, self._people.update(result))
         self._count(result)
-        self._add_ground(frame, result.ground)
+        self._add_ground(frame, scene)
         self._add_paths(scene)
         self._add_pairs(scene)
         self._add_hazards(result.hazards, scene)
@@ -132,7 +137,8 @@ class RunSummary:
         self.invalid_reasons.update(result.positions.reason[~result.positions.valid].tolist())
         self._live_tracks = tracks
 
-    def _add_ground(self, frame: Frame, ground: GroundMap | NoGroundMap) -> None:
+    def _add_ground(self, frame: Frame, scene: Scene) -> None:
+        ground = scene.ground
         if isinstance(ground, NoGroundMap):
             self.no_map_reasons[ground.reason] += 1
             self.no_map.add(frame.time_s, float("nan"), float("nan"), float("nan"))
@@ -143,7 +149,9 @@ class RunSummary:
         if self.background is None:
             width = min(_BACKGROUND_WIDTH_PX, frame.size_px[0])
             height = round(width * frame.size_px[1] / frame.size_px[0])
-            self.background = (frame.picture.resized_bgr(width, height).copy(), ground)
+            picture = frame.picture.resized_bgr(width, height).copy()
+            blur(picture, scene.hidden_px, np.array([0.0, 0.0, *frame.size_px]))
+            self.background = (picture, ground)
 
     def _add_paths(self, scene: Scene) -> None:
         names = scene.names()

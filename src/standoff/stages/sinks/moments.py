@@ -8,7 +8,9 @@ import cv2
 import numpy as np
 
 from standoff.core.homography import FloatArray
+from standoff.core.lengths import LengthUnit
 from standoff.core.types import Frame, ImageArray
+from standoff.stages.sinks.blurring import blur
 from standoff.stages.sinks.drawing import Overlay
 from standoff.stages.sinks.params import DrawParams
 from standoff.stages.sinks.scene import Pair, Scene
@@ -47,12 +49,12 @@ class Moment:
     region_px: FloatArray
     scene: Scene
 
-    def jpeg(self) -> bytes:
+    def jpeg(self, unit: LengthUnit) -> bytes:
         """Return the picture with the measurements drawn over it."""
         factor = max(1.0, _DRAWN_WIDTH_PX / self.picture.shape[1])
         drawn = cv2.resize(self.picture, None, fx=factor, fy=factor, interpolation=cv2.INTER_CUBIC).astype(np.uint8)
         params = DrawParams(size=1.5, legend=False)
-        Overlay(params).draw(drawn, Sketch.of(self.scene, params), self.region_px)
+        Overlay(params).draw(drawn, Sketch.of(self.scene, params, unit), self.region_px)
         return cv2.imencode(".jpg", drawn, [cv2.IMWRITE_JPEG_QUALITY, 82])[1].tobytes()
 
 
@@ -90,6 +92,7 @@ class WorstMoments:
         hazard = scene.hazards.get(pair)
         boxes = scene.tracks.xyxy_px[np.isin(scene.tracks.track_id, pair)]
         picture, region = _around(frame, boxes, self._width_px)
+        blur(picture, scene.hidden_px, region)
         return Moment(
             names=(names[pair[0]], names[pair[1]]),
             time_s=scene.time_s,

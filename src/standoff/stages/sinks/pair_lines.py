@@ -8,6 +8,7 @@ import numpy as np
 
 from standoff.core.classes import CLASSES, Role
 from standoff.core.homography import BoolArray, FloatArray
+from standoff.core.lengths import LengthUnit
 from standoff.core.types import IntArray
 from standoff.stages.sinks.palette import Tone
 from standoff.stages.sinks.scene import Scene
@@ -35,22 +36,7 @@ class PairLine:
     dashed: bool
 
 
-def distance_text(distance_m: float, sigma_m: float, *, filtered: bool = False) -> str:
-    """Return a distance for people; what the outlier filter made up is marked.
-
-    >>> distance_text(7.42, 0.31), distance_text(7.42, 0.031), distance_text(float("nan"), 1.0)
-    ('7.4 ±0.3 m', '7.42 ±0.03 m', 'unknown')
-    >>> distance_text(7.42, 0.31, filtered=True), distance_text(7.42, float("nan"))
-    ('≈ 7.4 ±0.3 m', '7.4 m')
-    """
-    if not np.isfinite(distance_m):
-        return "unknown"
-    decimals = 2 if sigma_m < 0.095 else 1
-    error = f" ±{sigma_m:.{decimals}f}" if np.isfinite(sigma_m) else ""
-    return f"{'≈ ' if filtered else ''}{distance_m:.{decimals}f}{error} m"
-
-
-def pair_lines(scene: Scene, feet_px: FloatArray, within_m: float) -> list[PairLine]:
+def pair_lines(scene: Scene, feet_px: FloatArray, within_m: float, unit: LengthUnit) -> list[PairLine]:
     """Choose the pairs to draw, gravest first.
 
     Every pair with an open hazard; for each person (each entity, in pairs without one) the nearest measured
@@ -60,6 +46,7 @@ def pair_lines(scene: Scene, feet_px: FloatArray, within_m: float) -> list[PairL
         scene: What there is.
         feet_px: (M, 2) where each track stands in the picture.
         within_m: Largest distance of a pair without a hazard.
+        unit: What the lines say distances in.
     """
     pairs, tracks = scene.proximities, scene.tracks
     if not len(pairs):
@@ -73,7 +60,7 @@ def pair_lines(scene: Scene, feet_px: FloatArray, within_m: float) -> list[PairL
     wanted |= _nearest_of_each_owner(rows, tracks.class_id, apart_px, ~measured & in_sight)
     keys = list(zip(pairs.track_a.tolist(), pairs.track_b.tolist(), strict=True))
     wanted |= np.array([key in scene.hazards for key in keys])
-    lines = [_line(scene, k, keys[k], rows[k]) for k in np.flatnonzero(wanted).tolist()]
+    lines = [_line(scene, k, keys[k], rows[k], unit) for k in np.flatnonzero(wanted).tolist()]
     return sorted(lines, key=lambda line: _RANK[line.tone])
 
 
@@ -91,12 +78,12 @@ def _nearest_of_each_owner(rows: IntArray, class_id: IntArray, apart: FloatArray
     return nearest
 
 
-def _line(scene: Scene, k: int, key: tuple[int, int], rows: IntArray) -> PairLine:
+def _line(scene: Scene, k: int, key: tuple[int, int], rows: IntArray, unit: LengthUnit) -> PairLine:
     pairs = scene.proximities
     hazard = scene.hazards.get(key)
     measured = bool(np.isfinite(pairs.distance_m[k]))
     tone: Tone = hazard.severity if hazard else ("light" if measured else "unknown")
-    distance = distance_text(pairs.distance_m[k], pairs.sigma_m[k], filtered=bool(pairs.filtered[k]))
+    distance = unit.distance(pairs.distance_m[k], pairs.sigma_m[k], filtered=bool(pairs.filtered[k]))
     return PairLine(
         row_a=int(rows[0]),
         row_b=int(rows[1]),

@@ -6,6 +6,8 @@ from typing import Annotated
 from annotated_types import Gt, Interval
 from typing_extensions import Doc
 
+from standoff.core.lengths import UnitName
+
 
 @dataclass(frozen=True, slots=True)
 class TableParams:
@@ -17,6 +19,19 @@ class TableParams:
     flush_rows: Annotated[int, Gt(0), Doc("Rows after which a part is written sooner, which bounds the memory.")] = (
         50_000
     )
+
+
+@dataclass(frozen=True, slots=True)
+class ShowParams:
+    """How the film and the report show lengths and people."""
+
+    unit: Annotated[
+        UnitName,
+        Doc("What people read lengths in: metres or feet. Tables, hazards.jsonl and run.json are always in metres."),
+    ] = "metres"
+    blur: Annotated[
+        bool, Doc("Make people unrecognisable in film and report; whom the detector misses stays recognisable.")
+    ] = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,8 +20,7 @@ from standoff.core.zones import NOT_PLACED, ZONE_WORDS, Zone
 from standoff.files.json_text import plain
 from standoff.files.whole import partial_file
 from standoff.stages.sinks.collect import HazardLife, RunSummary
-from standoff.stages.sinks.pair_lines import distance_text
-from standoff.stages.sinks.params import ReportParams
+from standoff.stages.sinks.params import ReportParams, ShowParams
 from standoff.stages.sinks.scene import ASSISTANCE
 
 _MOST_ROWS = 200
@@ -43,6 +42,7 @@ class ReportSink:
         checked: Gives after the last frame what the page says, in HTML, of how true the stated errors are, where truth
             is known; None or an empty text: they were not checked, and the page says so.
         zones: Of the site.
+        show: The unit of lengths, and whether people are made unrecognisable.
     """
 
     def __init__(
@@ -55,12 +55,13 @@ class ReportSink:
         at_close: Callable[[], Mapping[str, Any]] | None = None,
         checked: Callable[[], str] | None = None,
         zones: tuple[Zone, ...] = (),
+        show: ShowParams | None = None,
     ) -> None:
         self._checked = checked
         self._at_close = at_close
         self._path, self._warning_gap_m = Path(path), warning_gap_m
         self._descriptions = dict(descriptions or {})
-        self._summary = RunSummary(params or ReportParams(), zones)
+        self._summary = RunSummary(params or ReportParams(), zones, show)
 
     def write(self, result: FrameResult) -> None:
         """Take one frame."""
@@ -87,7 +88,7 @@ def render(
 
     folder = files("standoff.stages.sinks")
     environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True)
-    environment.filters.update(clock=clock, percent=_percent, metres=_metres)
+    environment.filters.update(clock=clock, percent=_percent, length=summary.unit.length, said=summary.unit.said)
     template = environment.from_string((folder / "report.html.j2").read_text(encoding="utf-8"))
     has_frames = summary.counts["frames"] > 0
     hazards = sorted(summary.hazards.values(), key=_gravest_first)
@@ -109,12 +110,11 @@ def render(
         plan_chart=Markup(plan_chart(summary)),
         zones=[_zone_row(zone, summary) for zone in summary.zones],
         unplaced=NOT_PLACED,
-        moments=[(moment, _data_uri(moment.jpeg())) for moment in shown],
+        moments=[(moment, _data_uri(moment.jpeg(summary.unit))) for moment in shown],
         warnings=descriptions.get("warnings", ()),
         basis=(ground := descriptions.get("ground") or {}).get("basis", ""),
         better=ground.get("better", ""),
         descriptions={heading: list(_flat(plain(value))) for heading, value in descriptions.items() if value},
-        distance_text=distance_text,
         assistance=ASSISTANCE,
         checked=Markup(checked),
     )
@@ -146,15 +146,6 @@ def _percent(share: float) -> str:
         return "unknown"
     percent = 100.0 * share
     return f"{percent:.0f} %" if percent in (0.0, 100.0) else f"{min(max(percent, 0.1), 99.9):.1f} %"
-
-
-def _metres(value_m: float) -> str:
-    """Return a length for people.
-
-    >>> _metres(-0.04), _metres(2.26), _metres(float("nan"))
-    ('0.0 m', '2.3 m', 'unknown')
-    """
-    return f"{round(value_m, 1) + 0.0:.1f} m" if math.isfinite(value_m) else "unknown"
 
 
 def _flat(value: Any, prefix: str = "") -> Iterator[tuple[str, str]]:  # noqa: ANN401

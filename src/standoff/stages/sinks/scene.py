@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -69,6 +69,7 @@ class Scene:
         hazards: Open hazards by pair.
         zones: All of the site.
         zone_hazards: Open hazards of zones.
+        hidden_px: (N, 4) boxes of the picture to be made unrecognisable, in full-size pixels.
     """
 
     frame_index: int
@@ -81,9 +82,16 @@ class Scene:
     hazards: Mapping[Pair, Hazard]
     zones: tuple[Zone, ...] = ()
     zone_hazards: tuple[Hazard, ...] = ()
+    hidden_px: FloatArray = field(default_factory=lambda: np.zeros((0, 4)))
 
     @classmethod
-    def of(cls, result: FrameResult, open_hazards: OpenHazards, zones: tuple[Zone, ...] = ()) -> Scene:
+    def of(
+        cls,
+        result: FrameResult,
+        open_hazards: OpenHazards,
+        zones: tuple[Zone, ...] = (),
+        hidden_px: FloatArray | None = None,
+    ) -> Scene:
         """Keep what is drawn of a result; the frame's pixels are let go."""
         return cls(
             frame_index=result.frame.index,
@@ -96,6 +104,7 @@ class Scene:
             hazards=open_hazards.by_pair(),
             zones=zones,
             zone_hazards=open_hazards.in_zones() if zones else (),
+            hidden_px=np.zeros((0, 4)) if hidden_px is None else hidden_px,
         )
 
     @property

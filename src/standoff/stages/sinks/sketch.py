@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from standoff.core.homography import FloatArray
+from standoff.core.lengths import METRES, LengthUnit
 from standoff.stages.sinks.fans import Fan, fans_of
 from standoff.stages.sinks.pair_lines import PairLine, pair_lines
 from standoff.stages.sinks.palette import Tone
@@ -22,6 +23,7 @@ class Sketch:
         feet_px: (M, 2) where each track stands, in full-size picture pixels.
         lines: Pairs to draw, gravest first.
         fans: What is ahead of those who move.
+        unit: What lengths are said in.
     """
 
     scene: Scene
@@ -29,10 +31,12 @@ class Sketch:
     feet_px: FloatArray
     lines: list[PairLine]
     fans: list[Fan]
+    unit: LengthUnit
 
     @classmethod
-    def of(cls, scene: Scene, params: DrawParams) -> Sketch:
+    def of(cls, scene: Scene, params: DrawParams, unit: LengthUnit = METRES) -> Sketch:
         """Decide what to draw."""
         feet_px = scene.feet_px()
         fans = fans_of(scene.positions) if params.fans else []
-        return cls(scene, scene.track_tones(), feet_px, pair_lines(scene, feet_px, params.line_within_m), fans)
+        lines = pair_lines(scene, feet_px, params.line_within_m, unit)
+        return cls(scene, scene.track_tones(), feet_px, lines, fans, unit)

@@ -6,12 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
+from standoff.core.lengths import UNITS
 from standoff.core.types import FrameResult, ImageArray, Outcome
 from standoff.core.zones import Zone
 from standoff.stages.sinks.birdseye import BirdsEye
+from standoff.stages.sinks.blurring import PeopleWatch, blur
 from standoff.stages.sinks.drawing import Overlay
 from standoff.stages.sinks.encoder import VideoFile
-from standoff.stages.sinks.params import VideoParams
+from standoff.stages.sinks.params import ShowParams, VideoParams
 from standoff.stages.sinks.scene import OpenHazards, Scene
 from standoff.stages.sinks.sketch import Sketch
 from standoff.stages.sinks.text import TextSprites
@@ -23,10 +25,14 @@ class Composer:
     Args:
         size_px: (width, height) of the camera's full-size pictures.
         params: Sizes and what is drawn.
+        show: For the unit of lengths.
     """
 
-    def __init__(self, size_px: tuple[int, int], params: VideoParams | None = None) -> None:
+    def __init__(
+        self, size_px: tuple[int, int], params: VideoParams | None = None, show: ShowParams | None = None
+    ) -> None:
         params = params or VideoParams()
+        self._unit = UNITS[(show or ShowParams()).unit]
         text = TextSprites()
         self._draw = params.draw
         self._picture_size_px, panel_width_px = _layout(size_px, params)
@@ -51,11 +57,13 @@ class Composer:
             (height, width, 3) uint8 BGR; the same array each time.
         """
         width = self._picture_size_px[0]
-        sketch = Sketch.of(scene, self._draw)
-        self._canvas[:, :width] = picture
+        sketch = Sketch.of(scene, self._draw, self._unit)
+        shown = self._canvas[:, :width]
+        shown[:] = picture
+        blur(shown, scene.hidden_px, np.array([0.0, 0.0, *scene.size_px]))
         if self._birdseye is not None:
-            self._birdseye.draw(self._canvas[:, width:], picture, sketch)
-        self._overlay.draw(self._canvas[:, :width], sketch)
+            self._birdseye.draw(self._canvas[:, width:], shown, sketch)
+        self._overlay.draw(shown, sketch)
         return self._canvas
 
     @property
@@ -71,10 +79,19 @@ class VideoSink:
         path: The file, usually `annotated.mp4`.
         params: Sizes, quality and what is drawn.
         zones: Of the site.
+        show: The unit of lengths, and whether people are made unrecognisable.
     """
 
-    def __init__(self, path: Path | str, params: VideoParams | None = None, zones: tuple[Zone, ...] = ()) -> None:
+    def __init__(
+        self,
+        path: Path | str,
+        params: VideoParams | None = None,
+        zones: tuple[Zone, ...] = (),
+        show: ShowParams | None = None,
+    ) -> None:
         self._path, self._params, self._zones = Path(path), params or VideoParams(), zones
+        self._show = show or ShowParams()
+        self._people = PeopleWatch(wanted=self._show.blur)
         self._hazards = OpenHazards()
         self._composer: Composer | None = None
         self._file: VideoFile | None = None
@@ -84,13 +101,14 @@ class VideoSink:
         """Draw and encode this frame."""
         frame = result.frame
         if self._composer is None or self._file is None:
-            self._composer = Composer(frame.size_px, self._params)
+            self._composer = Composer(frame.size_px, self._params, self._show)
             self._file = VideoFile(self._path, self._composer.size_px, crf=self._params.crf, preset=self._params.preset)
             self._start_s = frame.time_s
         self._hazards.update(result.hazards)
         size_px = self._composer.picture_size_px
         picture = frame.image if size_px == frame.size_px else frame.picture.resized_bgr(*size_px)
-        composed = self._composer.compose(picture, Scene.of(result, self._hazards, self._zones))
+        scene = Scene.of(result, self._hazards, self._zones, self._people.update(result))
+        composed = self._composer.compose(picture, scene)
         self._file.write(composed, frame.time_s - self._start_s)
 
     def close(self, outcome: Outcome) -> None:

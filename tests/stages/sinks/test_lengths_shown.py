@@ -1,0 +1,134 @@
+"""People read metres or feet; what is shown is the same."""
+
+from __future__ import annotations
+
+import html
+import re
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from pages import PageReader
+from stages.sinks.fake_site import FakeSite
+
+from standoff.core.lengths import FEET, METRES, LengthUnit
+from standoff.core.types import FrameResult, ImageArray, Outcome
+from standoff.stages.sinks import Composer, DrawParams, ReportParams, ReportSink, ShowParams, VideoParams
+from standoff.stages.sinks.birdseye import BirdsEye
+from standoff.stages.sinks.charts import read_in, themed_figure
+from standoff.stages.sinks.painter import Painter
+from standoff.stages.sinks.scene import OpenHazards, Scene
+from standoff.stages.sinks.sketch import Sketch
+from standoff.stages.sinks.text import TextSprites
+
+FOOT_M = 0.3048
+PANEL = (420, 400)
+
+
+@pytest.fixture(scope="module")
+def results() -> list[FrameResult]:
+    return list(FakeSite((320, 180)).results(75))
+
+
+def _page(folder: Path, results: list[FrameResult], show: ShowParams) -> str:
+    descriptions = {"ground": {"basis": "a square reference of 2.89 m: expect 1 %"}}
+    path = folder / f"{show.unit}.html"
+    sink = ReportSink(path, ReportParams(pairs=4, moments=1), descriptions, show=show)
+    for result in results:
+        sink.write(result)
+    sink.close(Outcome("complete"))
+    return path.read_text(encoding="utf-8")
+
+
+def test_lines_of_the_film_say_the_same_distances(results: list[FrameResult]) -> None:
+    scene = Scene.of(results[0], OpenHazards())
+    in_metres, in_feet = (Sketch.of(scene, DrawParams(), unit).lines for unit in (METRES, FEET))
+    assert len(in_metres) > 2
+    for one, other in zip(in_metres, in_feet, strict=True):
+        assert one.text.endswith(" m") and other.text.endswith(" ft")
+        assert float(other.text.split()[0]) * FOOT_M == pytest.approx(
+            float(one.text.split()[0]), abs=0.05 + 0.5 * FOOT_M
+        )
+
+
+@pytest.mark.parametrize("unit", [METRES, FEET])
+def test_the_panels_scale_bar_is_as_long_as_it_says(
+    monkeypatch: pytest.MonkeyPatch, results: list[FrameResult], unit: LengthUnit
+) -> None:
+    panel, text = np.zeros((PANEL[1], PANEL[0], 3), dtype=np.uint8), TextSprites()
+    said: list[str] = []
+    original = text.sprite
+
+    def sprite(word: str, size_px: int, *, bold: bool = False) -> ImageArray:
+        said.append(word)
+        return original(word, size_px, bold=bold)
+
+    monkeypatch.setattr(text, "sprite", sprite)
+    birdseye = BirdsEye(PANEL, DrawParams(circles=False, labels=False, fans=False), text)
+    sketch = Sketch.of(Scene.of(results[0], OpenHazards()), DrawParams(), unit)
+    birdseye.draw(panel, results[0].frame.image, sketch)
+    (label,) = {word for word in said if word.endswith(f" {unit.symbol}")}
+    window = birdseye._window
+    assert window is not None
+    bottom = PANEL[1] - Painter(panel, text).font_px
+    # All else is dimmed: only the bar is as light as this.
+    length_px = int((panel[bottom - 2 : bottom + 3].min(axis=2) > 190).any(axis=0).sum())
+    assert length_px * window.m_per_px == pytest.approx(float(label.split()[0]) * unit.in_m, abs=3 * window.m_per_px)
+
+
+@pytest.mark.parametrize("unit", [METRES, FEET])
+def test_an_axis_is_marked_where_the_number_lies(unit: LengthUnit) -> None:
+    with themed_figure(6.0, 4.0) as figure:
+        axes = figure.add_subplot()
+        axes.set_ylim(-7.3, 61.0)
+        read_in(axes.yaxis, unit, "gap")
+        figure.draw_without_rendering()
+        ticks = list(axes.get_yticks())
+        labels = [label.get_text().replace("\N{MINUS SIGN}", "-") for label in axes.get_yticklabels()]
+    assert axes.get_ylabel() == f"gap, {unit.symbol}"
+    assert len(ticks) >= 4
+    for place_m, text in zip(ticks, labels, strict=True):
+        assert float(text) * unit.in_m == pytest.approx(place_m, abs=1e-9)
+        assert len(text.strip("-")) <= 4  # round in the unit that is read
+
+
+def test_in_metres_axes_are_marked_as_matplotlib_does() -> None:
+    with themed_figure(6.0, 4.0) as figure:
+        own, plain = figure.subplots(1, 2)
+        for axes in (own, plain):
+            axes.set_ylim(-7.3, 61.7)
+        read_in(own.yaxis, METRES, "gap")
+        figure.draw_without_rendering()
+        assert [one.get_text() for one in own.get_yticklabels()] == [one.get_text() for one in plain.get_yticklabels()]
+
+
+def test_a_report_in_feet_has_no_metres_but_those_that_it_translates(
+    tmp_path: Path, results: list[FrameResult]
+) -> None:
+    pages = {unit: _page(tmp_path, results, ShowParams(unit=unit)) for unit in ("metres", "feet")}
+    said = {name: PageReader.of(page).text.partition("How it was made")[0] for name, page in pages.items()}
+    assert re.findall(r"[\d.]+ m\b", said["feet"]) == ["2.89 m"]
+    assert "rest on a square reference of 2.89 m (9.5 ft)" in said["feet"]
+    assert not re.findall(r"\bft\b|feet", said["metres"])
+    assert "Site frame in feet." in said["feet"] and "gap below 3.28 ft" in said["feet"]
+    assert ">gap of the closest pair, ft<" in pages["feet"] and ">x, ft<" in pages["feet"]
+    distances = {name: _distances(text) for name, text in said.items()}
+    assert len(distances["metres"]) == len(distances["feet"]) > 5
+    in_feet = np.array(distances["feet"]) * FOOT_M
+    np.testing.assert_allclose(in_feet, distances["metres"], atol=0.05 + 0.05 * FOOT_M)
+
+
+def _distances(text: str) -> list[float]:
+    return [float(number) for number in re.findall(r"(-?[\d.]+) ±", html.unescape(text))]
+
+
+def test_the_film_differs_in_its_words_only(results: list[FrameResult]) -> None:
+    plain = VideoParams(panel=False, draw=DrawParams(labels=False))
+    scene = Scene.of(results[0], OpenHazards())
+    image = results[0].frame.image
+    first, other = (
+        Composer((320, 180), plain, ShowParams(unit=name)).compose(cv2.resize(image, (320, 180)), scene).copy()
+        for name in ("metres", "feet")
+    )
+    np.testing.assert_array_equal(first, other)
