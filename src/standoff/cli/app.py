@@ -25,6 +25,7 @@ from standoff.cli import (
     run,
     simulate,
     train,
+    train_points,
 )
 from standoff.core.errors import StandoffError
 
@@ -37,6 +38,7 @@ app = typer.Typer(
 )
 app.command("run")(run.run)
 app.command("train")(train.train)
+app.command("train-points")(train_points.train_points)
 app.command("blend")(blend.blend)
 app.command("join")(join.join)
 app.command("export")(export.export)

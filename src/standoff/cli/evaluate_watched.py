@@ -60,7 +60,7 @@ def _table(result: WatchedResult) -> Table:
         *((reason, *_cells(missed)) for reason, missed in result.on_unwatched.items()),
     ]
     caption = (
-        f"Workers in frames, whose feet are in the picture; hidden: less than half of them to be seen. "
+        f"Workers in frames, whose feet are in the picture; hidden: a tenth of them and more, or cut off. "
         f"{100 * result.watched_share:.0f} % of the ground in the pictures is called watched; of {result.findable} "
         f"workers of heights of which nine of ten are found, {_percent(result.watched_of_findable)} stand on it. "
         f"Of {result.breaches} in a breach, {result.breaches_called_clear} stand on watched ground and are called "
@@ -79,7 +79,7 @@ def _finding_table(result: WatchedResult) -> Table:
     rows: list[tuple[str, ...]] = [(f"{height_px:.0f} px", f"{100 * share:.0f} %") for height_px, share in pairs]
     least_px = finding.least_height_px(0.9) if finding.measured else float("inf")
     caption = f"Pixels of the detector's input. Nine of ten are found from {least_px:.0f} px."
-    return Table("Workers found by how tall they are, at least half to be seen", ("height", "found"), rows, caption)
+    return Table("Workers found by how tall they are, nothing of them hidden", ("height", "found"), rows, caption)
 
 
 def _cells(missed: Missed) -> tuple[str, str, str]:

@@ -23,7 +23,7 @@ class WorkerFinding:
 
     Attributes:
         height_px: Heights of boxes in the network's input, rising.
-        share: Of those who are at least half to be seen, found at each of them: a track shows them.
+        share: Of those of whom nothing is hidden, found at each of them: a track shows them.
         input_size_px: (width, height) of the network's input; (0, 0): as large as the picture.
         view_share: The parts of the picture's width and height that the input shows, less than 1 where it looks at
             slices.

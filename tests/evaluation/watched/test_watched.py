@@ -96,7 +96,7 @@ def workers(height_px: np.ndarray[Any, Any], found: np.ndarray[Any, Any], detect
         detector=detector,
         height_px=2.0 * height_px,
         input_height_px=height_px,
-        visible_share=np.ones(count),
+        whole=np.ones(count, dtype=bool),
         cell=np.full(count, WATCHED),
         found=found,
         in_breach=np.zeros(count, dtype=bool),

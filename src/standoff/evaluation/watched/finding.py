@@ -11,15 +11,12 @@ from scipy.optimize import isotonic_regression
 from standoff.core.finding import WorkerFinding
 from standoff.evaluation.watched.samples import WorkerSamples
 
-MOSTLY_SEEN: Final = 0.5
-"""Workers of whom less can be seen are hidden by something, which no rule about the ground can know."""
-
 _HEIGHTS_PX: Final = tuple(8.0 * 2.0 ** (step / 2.0) for step in range(10))
 _FEWEST: Final = 20
 
 
 def measure_finding(samples: Sequence[WorkerSamples]) -> WorkerFinding:
-    """Count which of the workers, at least half of each to be seen, are found.
+    """Count which of the workers are found of whom nothing is hidden: of what hides, no rule about the ground knows.
 
     Bands of height, each a factor of the root of 2 wide, are made to rise with the height, as few workers in one of
     them would else make it fall (isotonic regression: Barlow et al. 1972). Bands of fewer than 20 are left out.
@@ -30,7 +27,7 @@ def measure_finding(samples: Sequence[WorkerSamples]) -> WorkerFinding:
     Returns:
         The detector's with what was measured; `measured` is False where there are not 20 workers in one band.
     """
-    seen = np.concatenate([one.visible_share >= MOSTLY_SEEN for one in samples])
+    seen = np.concatenate([one.whole for one in samples])
     height_px = np.concatenate([one.input_height_px for one in samples])[seen]
     found = np.concatenate([one.found for one in samples])[seen]
     edges = np.sqrt(np.multiply(_HEIGHTS_PX[:-1], _HEIGHTS_PX[1:]))

@@ -13,7 +13,7 @@ from standoff.core.finding import WorkerFinding
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import IntArray
 from standoff.core.watched_ground import COLUMNS, ROWS, cell_of
-from standoff.evaluation.beside_truth import BesideTruth, read_beside_truth
+from standoff.evaluation.beside_truth import WHOLE, BesideTruth, read_beside_truth
 from standoff.evaluation.matching import NOTHING
 from standoff.evaluation.pair_rows import PairRows, distances_of
 from standoff.evaluation.paper.clip_tables import PAIRS, read_table
@@ -33,7 +33,7 @@ class WorkerSamples:
         detector: What it says of the workers that it finds.
         height_px: (N,) of the box of all of him.
         input_height_px: (N,) the same in the detector's input.
-        visible_share: (N,) of him that nothing hides.
+        whole: (N,) whether less than a tenth of him is hidden, and nothing cut off by the picture's edge.
         cell: (N,) what the run says of the ground there, as in `WatchedGround.cells`.
         found: (N,) whether a track shows him.
         in_breach: (N,) whether his circle truly touches that of a machine that can be seen.
@@ -47,7 +47,7 @@ class WorkerSamples:
     detector: WorkerFinding
     height_px: FloatArray
     input_height_px: FloatArray
-    visible_share: FloatArray
+    whole: BoolArray
     cell: IntArray
     found: BoolArray
     in_breach: BoolArray
@@ -84,7 +84,7 @@ def read_worker_samples(run: Path, clip: Path) -> WorkerSamples:
         detector=detector,
         height_px=height_px,
         input_height_px=height_px / detector.picture_px_per_input_px(beside.size_px),
-        visible_share=truth["visible_share"][asked],
+        whole=truth["sight"][asked] == WHOLE,
         cell=cells[row, place[asked, 0], place[asked, 1]],
         found=beside.track_row[asked] != NOTHING,
         in_breach=in_breach[asked],

@@ -13,7 +13,7 @@ from standoff.core.finding import KEY as FINDS_WORKERS
 from standoff.core.finding import WorkerFinding
 from standoff.core.homography import BoolArray
 from standoff.core.watched_ground import NO_GROUND, REASONS, WATCHED
-from standoff.evaluation.watched.finding import MOSTLY_SEEN, measure_finding
+from standoff.evaluation.watched.finding import measure_finding
 from standoff.evaluation.watched.samples import WorkerSamples
 
 FINDABLE_SHARE = 0.9
@@ -52,11 +52,11 @@ class WatchedResult:
         clips: Folders.
         frames: That the runs read.
         watched_share: Of the ground in the pictures, mean of the clips.
-        on_watched: Workers who stand on ground called watched, at least half of each to be seen.
+        on_watched: Workers who stand on ground called watched, of whom nothing is hidden or cut off.
         on_watched_hidden: The others of them.
-        on_unwatched: Workers who stand elsewhere, at least half to be seen, by the reason.
-        findable: Workers, at least half to be seen, of clips and heights of which nine of ten are found: whom a rule
-            that knows the truth would watch.
+        on_unwatched: Whole workers who stand elsewhere, by the reason.
+        findable: Whole workers of clips and heights of which nine of ten are found: whom a rule that knows the truth
+            would watch.
         findable_watched: Of these, so many stand on ground called watched.
         breaches: Workers in a breach, in frames.
         breaches_called_clear: Of these, so many stand on ground called watched while nothing is said, or the wrong.
@@ -100,11 +100,11 @@ class WatchedResult:
 def score_watched(samples: Sequence[WorkerSamples]) -> WatchedResult:
     """Pool clips; one at least."""
     findable = [_findable(one) for one in samples]
-    visible, cell, found, breach, clear = (
+    seen, cell, found, breach, clear = (
         np.concatenate([getattr(one, name) for one in samples])
-        for name in ("visible_share", "cell", "found", "in_breach", "called_clear")
+        for name in ("whole", "cell", "found", "in_breach", "called_clear")
     )
-    could, watched, seen = np.concatenate(findable), cell == WATCHED, visible >= MOSTLY_SEEN
+    could, watched = np.concatenate(findable), cell == WATCHED
     names = {NO_GROUND: "no ground", **dict(enumerate(REASONS))}
     reasons = sorted(set(cell[~watched].tolist()))
     return WatchedResult(
@@ -124,11 +124,10 @@ def score_watched(samples: Sequence[WorkerSamples]) -> WatchedResult:
 
 def _findable(one: WorkerSamples) -> BoolArray:
     """Tell (N,) which workers are of a height of which nine of ten are found in the clip."""
-    seen = one.visible_share >= MOSTLY_SEEN
     band = np.floor(np.log(np.maximum(one.height_px, 1.0)) / np.log(_BAND)).astype(np.int64)
     could = np.zeros(len(band), dtype=np.bool_)
     for each in np.unique(band):
-        here = seen & (band == each)
+        here = one.whole & (band == each)
         if here.sum() >= _FEWEST and one.found[here].mean() >= FINDABLE_SHARE:
             could[here] = True
     return could

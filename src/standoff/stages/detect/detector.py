@@ -20,6 +20,8 @@ from standoff.stages.detect.letterbox import Letterbox, resize
 from standoff.stages.detect.model_card import file_sha256
 from standoff.stages.detect.network import Network
 from standoff.stages.detect.params import DetectParams
+from standoff.stages.detect.point_network import PointNetwork
+from standoff.stages.detect.shipped import find_ground_points
 from standoff.stages.detect.slices import View, held_whole_px, view_share, views
 from standoff.stages.detect.suppression import join_cut, prefer_finer, suppress
 
@@ -57,6 +59,10 @@ class OnnxDetector:
         finds_once = self._network.interface.finds_once
         self._iou_in_view = max(self._params.nms_iou, _SAME_BOX_IOU) if finds_once else self._params.nms_iou
         self._sha256 = file_sha256(path)
+        points_path = find_ground_points(self._params.ground_points)
+        threads = self._params.intra_op_threads
+        self._points = None if points_path is None else PointNetwork(points_path, self._params.provider, threads)
+        self._points_file = None if points_path is None else points_path.name
 
     def _columns_by_class(self) -> dict[int, IntArray]:
         """Site class id to the output columns of its labels, counted from the first class."""
@@ -88,6 +94,7 @@ class OnnxDetector:
             "classes": list(self._classes),
             "class_map": dict(self._site_class_of),
             "ignored_labels": [label for label in self._classes if label not in self._site_class_of],
+            "ground_points": self._points_file,
             "providers": self._network.providers,
             "onnxruntime": onnxruntime.__version__,
         }
@@ -128,7 +135,7 @@ class OnnxDetector:
         resized = _resized(frame, view, letterbox.inner_size_px)
         # The least threshold of all is the least that matters.
         candidates = self._network.candidates(resized, letterbox, self._thresholds.min())
-        found = self._classified(candidates, letterbox)
+        found = self._pointed(self._classified(candidates, letterbox), resized, letterbox)
         shift = np.array([view.left_px, view.top_px])
         found = replace(found, xyxy_px=found.xyxy_px + np.tile(shift, 2), foot_px=found.foot_px + shift)
         inner_px = letterbox.inner_size_px
@@ -137,6 +144,19 @@ class OnnxDetector:
             _CUT_MARGIN_INPUT_PX * view.height_px / inner_px[1],
         )
         return found, view.is_cut(found.xyxy_px, margin_px)
+
+    def _pointed(self, found: Detections, resized: ImageArray, letterbox: Letterbox) -> Detections:
+        """Let the network of ground points say where things stand of which the detector does not."""
+        untold = np.isnan(found.foot_px).any(axis=1)
+        if self._points is None or not untold.any():
+            return found
+        scale = letterbox.source_px_per_input_px
+        boxes_px = (found.xyxy_px[untold] + 0.5) / np.tile(scale, 2) - 0.5
+        points_px, sigma_px = self._points.points(resized, boxes_px, found.class_id[untold])
+        foot_px, covariance_px2 = found.foot_px.copy(), found.foot_covariance_px2.copy()
+        foot_px[untold] = (points_px + 0.5) * scale - 0.5
+        covariance_px2[untold] = ((sigma_px * scale) ** 2)[:, :, None] * np.eye(2)
+        return replace(found, foot_px=foot_px, foot_covariance_px2=covariance_px2)
 
     def _classified(self, candidates: Candidates, letterbox: Letterbox) -> Detections:
         """Turn candidates into boxes of the view and classes of the site, without duplicates."""

@@ -55,6 +55,13 @@ class DetectParams:
         Interval(gt=0, le=1),
         Doc("A box cut by a slice's border is part of one that holds this much of the smaller of the two."),
     ] = 0.6
+    ground_points: Annotated[
+        str,
+        Doc(
+            "Small network that tells where the things in the boxes stand, if the detector does not: 'site', the "
+            "one that comes with standoff; 'none': then where things of a class usually stand; or an ONNX file."
+        ),
+    ] = "site"
     provider: Annotated[Provider, Doc("What computes; 'auto' takes CUDA where ONNX Runtime has it, else the CPU.")] = (
         "auto"
     )

@@ -12,6 +12,26 @@ ShippedModel = Literal["site", "site-int8"]
 SHIPPED_MODELS: Final[tuple[ShippedModel, ...]] = get_args(ShippedModel)
 
 
+_GROUND_POINTS: Final = "ground-points.onnx"
+
+
+def find_ground_points(name: str) -> Path | None:
+    """Return the file of a network of ground points.
+
+    Args:
+        name: "site", "none", or the path of an ONNX file.
+
+    Returns:
+        None for "none".
+
+    Raises:
+        ModelError: standoff was installed without it.
+    """
+    if name == "none":
+        return None
+    return _file_of_ours(_GROUND_POINTS, "the network of ground points") if name == "site" else Path(name)
+
+
 def find_model(model: str | Path) -> Path:
     """Return the file of a detector.
 
@@ -26,11 +46,15 @@ def find_model(model: str | Path) -> Path:
     """
     if model not in SHIPPED_MODELS:
         return Path(model)
-    path = Path(str(files("standoff"))) / "models" / f"{model}.onnx"
+    return _file_of_ours(f"{model}.onnx", f"the detector '{model}'")
+
+
+def _file_of_ours(name: str, what: str) -> Path:
+    path = Path(str(files("standoff"))) / "models" / name
     if not path.is_file():
         raise ModelError(
-            expected=f"the detector '{model}' that comes with standoff",
+            expected=f"{what} that comes with standoff",
             found=f"no {path}",
-            fix="install standoff again, or pass --model with an ONNX file (`standoff export` makes one)",
+            fix="install standoff again, or give an ONNX file of your own",
         )
     return path

@@ -44,4 +44,4 @@ class WatchedParams:
     ] = 13.0
     judge_every_s: Annotated[
         float, Ge(0), Doc("The picture and the map are judged anew after so many seconds, machines in every frame.")
-    ] = 0.2
+    ] = 0.5

@@ -71,6 +71,8 @@ class GroundWatcher:
         self._judged_s = -math.inf
         self._cells: CellArray = np.zeros((ROWS, COLUMNS), dtype=np.int8)
         self._found: FloatArray = np.zeros((ROWS, COLUMNS))
+        self._judged = self._judged_small = 0
+        self._usual_px = 0.0
 
     @property
     def description(self) -> Mapping[str, Any]:
@@ -80,7 +82,19 @@ class GroundWatcher:
             "worker_height_px": finding.height_px,
             "found_share": finding.share,
             "measured": finding.measured,
+            "warnings": self._warnings(),
         }
+
+    def _warnings(self) -> list[str]:
+        """Return what would make ground watched that is not."""
+        if 2 * self._judged_small <= self._judged:
+            return []
+        usual_px, share = self._usual_px / self._judged, self._params.found_share
+        least_px = self._finding.least_height_px(share)
+        return [
+            f"most ground is not watched: a worker there is about {usual_px:.0f} px tall in the detector's input, and "
+            f"{share:.0%} of them are found from {least_px:.0f} px on: fly lower, zoom in, or set detect.slices"
+        ]
 
     def update(
         self, frame: Frame, ground: GroundMap | NoGroundMap, tracks: Tracks, positions: GroundPositions
@@ -111,6 +125,11 @@ class GroundWatcher:
         asked = ground_cells(ground, size_px, params.stature_m)
         self._found = self._finding.share_found(asked.height_px, size_px).reshape(ROWS, COLUMNS)
         small_px = self._finding.picture_px_per_input_px(size_px)
+        if asked.is_ground.any():
+            self._judged += 1
+            self._usual_px += float(np.median(asked.height_px[asked.is_ground])) / small_px
+            found = self._found[asked.is_ground.reshape(ROWS, COLUMNS)]
+            self._judged_small += int((found < params.found_share).mean() > 0.5)
         dark, faint, blurred = self._unusable(picture_quality(frame.picture, *_PARTS), small_px)
         causes = (
             (~asked.is_ground, NO_GROUND),

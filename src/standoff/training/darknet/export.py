@@ -18,7 +18,7 @@ from standoff.training.darknet.sections import read_names_text
 from standoff.training.darknet.shapes import check_input
 from standoff.training.required import require_packages
 
-_OPSET = 17
+OPSET = 17
 
 
 def export_darknet(
@@ -103,7 +103,7 @@ def _write_onnx(cfg: DarknetCfg, weights: Path, card: ModelCard, path: Path) -> 
             (picture,),
             str(path),
             dynamo=False,
-            opset_version=_OPSET,
+            opset_version=OPSET,
             input_names=[INPUT_NAME],
             output_names=[OUTPUT_NAME, POINTS_NAME] if has_point else [OUTPUT_NAME],
         )

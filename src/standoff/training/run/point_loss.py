@@ -27,19 +27,20 @@ _FAR_SIGMA: Final = 4.0
 """Standard errors beyond which a residual counts less: for a Gaussian 5 % of them, and one in 16,000."""
 
 
-def point_loss(residual: Tensor, log_sigma: Tensor) -> Tensor:
+def point_loss(residual: Tensor, log_sigma: Tensor, least_log_sigma: float = LOG_SIGMA[0]) -> Tensor:
     """Return the sum over points of both terms; points that nobody marked count nothing.
 
     Args:
         residual: (P, 2) what is said less what is true, in any unit; NaN where nothing is known.
-        log_sigma: (P, 2) logarithm of the stated standard error, in the same unit, `LOG_SIGMA` or more.
+        log_sigma: (P, 2) logarithm of the stated standard error, in the same unit.
+        least_log_sigma: It is this or more; the default is that of heads beside boxes.
 
     >>> point_loss(torch.tensor([[0.0, torch.nan]]), torch.full((1, 2), LOG_SIGMA[0])).item()
     0.0
     """
     known = torch.isfinite(residual)
     # Counted from the least that can be told, the logarithm keeps the loss from becoming negative.
-    above_least = log_sigma - LOG_SIGMA[0]
+    above_least = log_sigma - least_log_sigma
     residual, log_sigma = torch.where(known, residual, 0.0), torch.where(known, log_sigma, 0.0)
     sigma = log_sigma.detach().exp()
     mean = sigma * _huber(residual / sigma, _FAR_MEAN)

@@ -1,0 +1,86 @@
+"""Where the things in a detector's boxes stand, told by a second, small network that sees one box at a time."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from standoff.core.boxes import unknown_points
+from standoff.core.classes import CLASS_BY_NAME
+from standoff.core.errors import ModelError
+from standoff.core.homography import FloatArray
+from standoff.core.types import ImageArray, IntArray
+from standoff.stages.detect.params import Provider
+from standoff.stages.detect.point_crops import POINT_CLASSES, crop, squares_px
+from standoff.stages.detect.runtime import ONNX_ERRORS, open_session, told_by_runtime
+
+FORMAT_KEY: Final = "standoff_ground_points"
+FORMAT: Final = "1"
+CROPS_INPUT: Final = "crops"
+CLASS_INPUT: Final = "class_index"
+POINTS_OUTPUT: Final = "points"
+
+_INDEX_OF_CLASS = np.full(len(CLASS_BY_NAME), -1)
+for _name in POINT_CLASSES:
+    _INDEX_OF_CLASS[CLASS_BY_NAME[_name].id] = POINT_CLASSES.index(_name)
+
+
+class PointNetwork:
+    """A loaded network of ground points.
+
+    Args:
+        path: ONNX file that `standoff train-points` wrote.
+        provider: What computes.
+        intra_op_threads: Threads on the CPU; 0: as many as cores.
+
+    Raises:
+        ModelError: The file is no such network.
+        MissingDependency: The execution provider is not there.
+    """
+
+    def __init__(self, path: Path, provider: Provider, intra_op_threads: int) -> None:
+        self._session = open_session(path, provider, intra_op_threads)
+        self._name = path.name
+        texts = self._session.get_modelmeta().custom_metadata_map
+        if texts.get(FORMAT_KEY) != FORMAT or json.loads(texts.get("classes", "[]")) != list(POINT_CLASSES):
+            raise ModelError(
+                expected=f"a network of ground points at {path}",
+                found="another one" if FORMAT_KEY not in texts else "one of another version of standoff",
+                fix="make it with `standoff train-points`, or leave detect.ground_points out",
+            )
+
+    def points(self, image: ImageArray, xyxy_px: FloatArray, class_id: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Say where things stand.
+
+        Args:
+            image: (H, W, 3) blue first.
+            xyxy_px: (N, 4) boxes in it.
+            class_id: (N,) ids of `CLASSES`.
+
+        Returns:
+            (N, 2) points in the same pixels, perhaps outside, and (N, 2) their standard errors; NaN of what has none.
+
+        Raises:
+            ModelError: The network cannot be run.
+        """
+        points, sigma = unknown_points(len(class_id)), unknown_points(len(class_id))
+        rows = np.flatnonzero(_INDEX_OF_CLASS[class_id] >= 0)
+        if not len(rows):
+            return points, sigma
+        squares = squares_px(xyxy_px[rows])
+        crops = np.stack([crop(image, square) for square in squares])[..., ::-1]
+        feed = {
+            CROPS_INPUT: np.ascontiguousarray(crops.transpose(0, 3, 1, 2), dtype=np.float32) / np.float32(255.0),
+            CLASS_INPUT: _INDEX_OF_CLASS[class_id[rows]],
+        }
+        try:
+            told = np.asarray(self._session.run([POINTS_OUTPUT], feed)[0], dtype=np.float64)
+        except ONNX_ERRORS as error:
+            found = told_by_runtime(error)
+            raise ModelError(expected=f"{self._name} to run", found=found, fix="copy the file again") from error
+        points[rows] = squares[:, :2] + told[:, :2] * squares[:, 2:] - 0.5
+        sigma[rows] = told[:, 2:] * squares[:, 2:]
+        return points, sigma

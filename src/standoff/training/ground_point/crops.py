@@ -1,0 +1,118 @@
+"""Crops of labelled things with their ground points, as training draws them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import cv2
+import numpy as np
+
+from standoff.core.homography import FloatArray
+from standoff.core.types import ImageArray, IntArray
+from standoff.labels import LabelledPicture, load_picture
+from standoff.stages.detect.point_crops import AROUND, CROP_PX, POINT_CLASSES, crop, squares_px
+from standoff.training.pictures.augment_params import AugmentParams
+from standoff.training.pictures.degrade import degrade
+
+PATCH_PX: Final = 144
+"""Side of what is kept of a thing: at the scale of a crop, half as much again for turns and shifts."""
+_LEAST_BOX_PX: Final = 8.0
+_FARTHEST_SIDES: Final = 1.0
+"""A point further from the middle of its crop, in sides of it, tells of a thing that is hardly in the picture."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Patches:
+    """Things in boxes (N).
+
+    Attributes:
+        images: (N, PATCH_PX, PATCH_PX, 3).
+        point: (N, 2) in patches, from 0 to 1 across and down.
+        class_index: (N,) place in `POINT_CLASSES`.
+        height_px: (N,) of the box.
+    """
+
+    images: ImageArray
+    point: FloatArray
+    class_index: IntArray
+    height_px: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.point)
+
+
+def read_patches(
+    pictures: Sequence[LabelledPicture], classes: Sequence[str], on_picture: Callable[[], None] | None = None
+) -> Patches:
+    """Cut out whatever has a ground point.
+
+    Args:
+        pictures: Labelled.
+        classes: Names of their classes.
+        on_picture: Called after each.
+    """
+    place = {name: k for k, name in enumerate(POINT_CLASSES)}
+    of_class = np.array([place.get(name, -1) for name in classes])
+    images, points, class_index, heights = [], [], [], []
+    for picture in pictures:
+        sides_px = picture.xyxy_px[:, 2:] - picture.xyxy_px[:, :2]
+        squares = squares_px(picture.xyxy_px, AROUND * PATCH_PX / CROP_PX)
+        inside = (picture.foot_px + 0.5 - squares[:, :2]) / squares[:, 2:]
+        usable = ~picture.ignored & (of_class[picture.class_id] >= 0) & (sides_px[:, 1] >= _LEAST_BOX_PX)
+        usable &= np.abs(np.nan_to_num(inside, nan=9.0) - 0.5).max(axis=1) * PATCH_PX / CROP_PX < _FARTHEST_SIDES
+        rows = np.flatnonzero(usable)
+        image = load_picture(picture) if len(rows) else None
+        for row in rows.tolist():
+            assert image is not None
+            images.append(crop(image, squares[row], PATCH_PX))
+            points.append(inside[row])
+            class_index.append(of_class[picture.class_id[row]])
+            heights.append(sides_px[row, 1])
+        if on_picture is not None:
+            on_picture()
+    return Patches(
+        np.array(images, dtype=np.uint8).reshape(-1, PATCH_PX, PATCH_PX, 3),
+        np.array(points, dtype=np.float64).reshape(-1, 2),
+        np.array(class_index, dtype=np.int64),
+        np.array(heights, dtype=np.float64),
+    )
+
+
+def middle_crop(patch: ImageArray, point: FloatArray) -> tuple[ImageArray, FloatArray]:
+    """Return what the network sees of a patch where the box is right, and the point in it."""
+    edge = (PATCH_PX - CROP_PX) // 2
+    return patch[edge : edge + CROP_PX, edge : edge + CROP_PX], (point * PATCH_PX - edge) / CROP_PX
+
+
+def drawn_crop(
+    rng: np.random.Generator, patch: ImageArray, point: FloatArray, params: AugmentParams
+) -> tuple[ImageArray, FloatArray]:
+    """Draw one view: another box, mirrored, turned a little, worse to see; and the point in it.
+
+    Args:
+        rng: Of all that is random.
+        patch: (PATCH_PX, PATCH_PX, 3).
+        point: (2,) in the patch, from 0 to 1.
+        params: How pictures are made worse.
+    """
+    zoom = float(np.exp(rng.normal(0.0, 0.08)))
+    turn = np.radians(rng.normal(0.0, 4.0))
+    mirror = -1.0 if rng.random() < 0.5 else 1.0
+    linear = zoom * np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]]) @ np.diag([mirror, 1.0])
+    middle, to = np.full(2, PATCH_PX / 2.0), np.full(2, CROP_PX / 2.0) + rng.normal(0.0, 0.035 * CROP_PX, 2)
+    shift = to - linear @ middle
+    # OpenCV counts pixels from the centre of the first, the point from its edge.
+    matrix = np.column_stack([linear, shift + linear @ np.full(2, 0.5) - 0.5])
+    seen = cv2.warpAffine(patch, matrix, (CROP_PX, CROP_PX), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    if rng.random() < 0.25:
+        small = int(rng.integers(12, CROP_PX // 2))
+        seen = cv2.resize(cv2.resize(seen, (small, small), interpolation=cv2.INTER_AREA), (CROP_PX, CROP_PX))
+    if rng.random() < 0.3:
+        # Something stands before it.
+        width, height = rng.integers(8, CROP_PX // 2, 2)
+        left, top = rng.integers(-8, CROP_PX - 8, 2)
+        seen = seen.copy()
+        seen[max(top, 0) : top + height, max(left, 0) : left + width] = rng.integers(0, 256, 3)
+    return degrade(rng, np.ascontiguousarray(seen), params), (linear @ (point * PATCH_PX) + shift) / CROP_PX

@@ -1,0 +1,92 @@
+"""A network of ground points beside a detector: any detector's boxes get points, its own are left alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from square_detector import SIZE_PX, draw_squares, write_detector
+
+from standoff.core.classes import CLASS_BY_NAME
+from standoff.core.errors import ModelError
+from standoff.stages.detect import DetectParams, OnnxDetector
+from standoff.stages.detect.point_crops import AROUND, POINT_CLASSES
+from standoff.stages.detect.point_network import PointNetwork
+from standoff.stages.frames import frame_from_array
+
+torch = pytest.importorskip("torch", reason="the network that is read here is written with torch")
+
+PLACES = np.column_stack([np.linspace(0.3, 0.7, len(POINT_CLASSES)), np.linspace(0.9, 0.5, len(POINT_CLASSES))])
+STRETCH = 2.0
+
+
+@pytest.fixture(scope="module")
+def points_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A network that says one place of the square for each class, whatever it sees."""
+    from standoff.training.ground_point import PointError, write_points
+    from standoff.training.ground_point.network import GroundPointNetwork
+
+    network = GroundPointNetwork().eval()
+    for parameter in [*network.map[-1].parameters(), *network.sigma[-1].parameters()]:
+        torch.nn.init.zeros_(parameter)
+    network.begin_at(torch.tensor(PLACES, dtype=torch.float32))
+    errors = [PointError(name, 1, 0.0, 0.0, 1.0, STRETCH) for name in POINT_CLASSES]
+    path = tmp_path_factory.mktemp("points") / "points.onnx"
+    write_points(network, errors, path, {"steps": 0})
+    return path
+
+
+def test_every_class_has_its_own_points_and_the_reference_none(points_file: Path) -> None:
+    network = PointNetwork(points_file, "cpu", 1)
+    image = np.random.default_rng(0).integers(0, 256, (200, 300, 3)).astype(np.uint8)
+    boxes_px = np.array([[20.0, 30.0, 60.0, 110.0], [100.0, 20.0, 160.0, 60.0], [200.0, 100.0, 299.0, 199.0]])
+    for name in POINT_CLASSES:
+        class_id = np.array([CLASS_BY_NAME[name].id, CLASS_BY_NAME["reference"].id, CLASS_BY_NAME[name].id])
+        points_px, sigma_px = network.points(image, boxes_px, class_id)
+        assert np.isnan(points_px[1]).all() and np.isnan(sigma_px[1]).all()
+        side_px = AROUND * (boxes_px[:, 2:] - boxes_px[:, :2]).max(axis=1)
+        middle_px = (boxes_px[:, :2] + boxes_px[:, 2:]) / 2.0
+        expected_px = middle_px + (PLACES[POINT_CLASSES.index(name)] - 0.5) * side_px[:, None]
+        np.testing.assert_allclose(points_px[[0, 2]], expected_px[[0, 2]], atol=1.0)
+        np.testing.assert_allclose(sigma_px[[0, 2]] / side_px[[0, 2], None], STRETCH * np.exp(-2.0), rtol=0.03)
+    none_px, _ = network.points(image, boxes_px[:0], np.zeros(0, dtype=np.int64))
+    assert none_px.shape == (0, 2)
+
+
+@pytest.mark.parametrize("scale", [1, 2, 3])
+def test_boxes_of_a_detector_without_points_get_some_in_the_pixels_of_the_picture(
+    points_file: Path, tmp_path: Path, scale: int
+) -> None:
+    model = write_detector(tmp_path)
+    image, _ = draw_squares(0)
+    frame = frame_from_array(np.repeat(np.repeat(image, scale, axis=0), scale, axis=1))
+    bare = OnnxDetector(model, DetectParams(ground_points="none")).detect(frame)
+    found = OnnxDetector(model, DetectParams(ground_points=str(points_file))).detect(frame)
+    assert np.isnan(bare.foot_px).all() and len(found) > 0
+    np.testing.assert_array_equal(found.xyxy_px, bare.xyxy_px)
+    known = np.isin(found.class_id, [CLASS_BY_NAME[name].id for name in POINT_CLASSES])
+    assert known.any()
+    index = [POINT_CLASSES.index(name) for name in POINT_CLASSES]
+    by_class = {CLASS_BY_NAME[POINT_CLASSES[k]].id: PLACES[k] for k in index}
+    side_px = AROUND * (found.xyxy_px[:, 2:] - found.xyxy_px[:, :2]).max(axis=1)
+    middle_px = (found.xyxy_px[:, :2] + found.xyxy_px[:, 2:]) / 2.0
+    for row in np.flatnonzero(known):
+        expected_px = middle_px[row] + (by_class[int(found.class_id[row])] - 0.5) * side_px[row]
+        np.testing.assert_allclose(found.foot_px[row], expected_px, atol=1.5 * scale)
+        variance_px2 = (STRETCH * np.exp(-2.0) * side_px[row]) ** 2
+        np.testing.assert_allclose(np.diag(found.foot_covariance_px2[row]), variance_px2, rtol=0.3)
+
+
+def test_another_network_in_its_place_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ModelError, match="a network of ground points"):
+        PointNetwork(write_detector(tmp_path), "cpu", 1)
+    with pytest.raises(ModelError, match="no such file"):
+        OnnxDetector(write_detector(tmp_path), DetectParams(ground_points="missing.onnx"))
+
+
+def test_the_detectors_description_names_the_network(points_file: Path, tmp_path: Path) -> None:
+    model = write_detector(tmp_path)
+    for name, expected in ((str(points_file), points_file.name), ("none", None)):
+        assert OnnxDetector(model, DetectParams(ground_points=name)).description["ground_points"] == expected
+    assert SIZE_PX[0] > 0

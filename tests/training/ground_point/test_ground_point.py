@@ -1,0 +1,77 @@
+"""Ground points are learnt, and their stated errors hold on what was not learnt from."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cli.calling import Call
+
+from standoff.core.errors import DataError
+from standoff.core.homography import FloatArray
+from standoff.stages.detect.point_crops import CROP_PX, POINT_CLASSES
+from standoff.training.ground_point import Patches, PointTraining, measure_points, read_patches, train_points
+from standoff.training.ground_point.crops import PATCH_PX, drawn_crop, middle_crop
+from standoff.training.pictures.augment_params import AugmentParams
+
+UNTOUCHED = replace(
+    AugmentParams(), **dict.fromkeys(("shadows", "colour", "blur", "lost_detail", "noise", "jpeg"), 0.0)
+)
+EXCAVATOR = POINT_CLASSES.index("excavator")
+
+
+def dots(count: int, seed: int) -> Patches:
+    """Grey patches with a bright blob where the point is."""
+    rng = np.random.default_rng(seed)
+    images = rng.integers(60, 110, (count, PATCH_PX, PATCH_PX, 3)).astype(np.uint8)
+    places_px = rng.uniform(0.3 * PATCH_PX, 0.7 * PATCH_PX, (count, 2))
+    rows, columns = np.mgrid[:PATCH_PX, :PATCH_PX] + 0.5
+    for image, (x, y) in zip(images, places_px, strict=True):
+        image[(columns - x) ** 2 + (rows - y) ** 2 < 8**2] = 250
+    return Patches(images, places_px / PATCH_PX, np.full(count, EXCAVATOR), np.full(count, 100.0))
+
+
+def blob_middle(image: FloatArray) -> FloatArray:
+    rows, columns = np.mgrid[:CROP_PX, :CROP_PX] + 0.5
+    bright = image.max(axis=2) > 180
+    return np.array([columns[bright].mean(), rows[bright].mean()]) / CROP_PX
+
+
+def test_the_point_goes_with_what_is_seen() -> None:
+    patches, rng = dots(40, 0), np.random.default_rng(1)
+    compared = 0
+    for image, point in zip(patches.images, patches.point, strict=True):
+        seen, place = middle_crop(image, point)
+        np.testing.assert_allclose(blob_middle(seen), place, atol=0.01)
+        drawn, place = drawn_crop(rng, image, point, UNTOUCHED)
+        if np.abs(place - 0.5).max() < 0.35 and 100 < (drawn.max(axis=2) > 180).sum() < 400:
+            np.testing.assert_allclose(blob_middle(drawn), place, atol=0.05)
+            compared += 1
+    assert compared > 15
+
+
+@pytest.mark.live
+def test_what_can_be_seen_is_learnt_and_its_errors_hold() -> None:
+    plan = PointTraining(steps=250, batch=16, workers=0)
+    network = train_points(dots(300, 2), plan)
+    (error,) = (one for one in measure_points(network, dots(200, 3)) if one.count)
+    assert error.name == "excavator" and error.count == 200
+    # Nothing but the middle would be off by a quarter of the side.
+    assert error.median < 0.06
+    told = measure_points(network, dots(200, 4))[EXCAVATOR]
+    assert told.stretch == pytest.approx(error.stretch, rel=0.35)
+
+
+def test_what_has_no_point_teaches_nothing() -> None:
+    empty = Patches(*(getattr(dots(2, 0), field.name)[:0] for field in fields(Patches)))
+    with pytest.raises(DataError, match="ground points"):
+        train_points(empty, PointTraining(steps=1))
+    assert len(read_patches([], ["worker"])) == 0
+
+
+def test_the_verb_needs_pictures_with_points(tmp_path: Path, call: Call) -> None:
+    code, _, error = call("train-points", tmp_path / "none", "--out", tmp_path / "points.onnx")
+    assert (code, error.count("\n")) == (2, 1)
+    assert not (tmp_path / "points.onnx").exists()
