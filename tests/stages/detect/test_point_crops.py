@@ -25,13 +25,14 @@ def test_what_is_in_the_square_is_where_it_is_said_to_be_in_the_crop(seed: int) 
         image = np.zeros((SIZE_PX[1], SIZE_PX[0], 3), np.uint8)
         middle_px, side_px = rng.uniform((0, 0), SIZE_PX), float(rng.uniform(30, 200))
         (square,) = squares_px(np.array([[*(middle_px - side_px / 2), *(middle_px + side_px / 2)]]))
-        dot_px = rng.uniform(np.maximum(square[:2], 8), np.minimum(square[:2] + square[2], SIZE_PX) - 9).round()
+        low_px, high_px = np.maximum(square[:2], 0) + 5.0, np.minimum(square[:2] + square[2], SIZE_PX) - 6.0
+        if (low_px >= high_px).any():
+            continue
+        dot_px = rng.uniform(low_px, high_px).round()
         x, y = dot_px.astype(int)
         image[y - 3 : y + 4, x - 3 : x + 4] = 255
         seen = crop(image, square)[:, :, 0].astype(np.float64)
         rows, columns = np.mgrid[:CROP_PX, :CROP_PX] + 0.5
-        if dot_px.min() - 3 < 0 or seen.sum() == 0:
-            continue
         found = np.array([(columns * seen).sum(), (rows * seen).sum()]) / seen.sum() / CROP_PX
         np.testing.assert_allclose(found * square[2] + square[:2] - 0.5, dot_px, atol=0.5)
 

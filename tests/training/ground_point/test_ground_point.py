@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import fields, replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from cli.calling import Call
 
 from standoff.core.errors import DataError
 from standoff.core.homography import FloatArray
@@ -69,9 +67,3 @@ def test_what_has_no_point_teaches_nothing() -> None:
     with pytest.raises(DataError, match="ground points"):
         train_points(empty, PointTraining(steps=1))
     assert len(read_patches([], ["worker"])) == 0
-
-
-def test_the_verb_needs_pictures_with_points(tmp_path: Path, call: Call) -> None:
-    code, _, error = call("train-points", tmp_path / "none", "--out", tmp_path / "points.onnx")
-    assert (code, error.count("\n")) == (2, 1)
-    assert not (tmp_path / "points.onnx").exists()
