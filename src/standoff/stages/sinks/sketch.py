@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from standoff.core.homography import FloatArray
+from standoff.core.types import GroundMap
+from standoff.core.watched_ground import CellArray
 from standoff.stages.sinks.fans import Fan, fans_of
 from standoff.stages.sinks.pair_lines import PairLine, pair_lines
 from standoff.stages.sinks.palette import Tone
@@ -22,6 +26,7 @@ class Sketch:
         feet_px: (M, 2) where each track stands, in full-size picture pixels.
         lines: Pairs to draw, gravest first.
         fans: What is ahead of those who move.
+        cells: Ground to hatch, as in `WatchedGround`; (0, 0): none, or the whole picture is unknown.
     """
 
     scene: Scene
@@ -29,10 +34,14 @@ class Sketch:
     feet_px: FloatArray
     lines: list[PairLine]
     fans: list[Fan]
+    cells: CellArray
 
     @classmethod
     def of(cls, scene: Scene, params: DrawParams) -> Sketch:
         """Decide what to draw."""
         feet_px = scene.feet_px()
         fans = fans_of(scene.positions) if params.fans else []
-        return cls(scene, scene.track_tones(), feet_px, pair_lines(scene, feet_px, params.line_within_m), fans)
+        lines = pair_lines(scene, feet_px, params.line_within_m)
+        hatched = params.unwatched and isinstance(scene.ground, GroundMap)
+        cells = scene.watched.cells if hatched else np.zeros((0, 0), dtype=np.int8)
+        return cls(scene, scene.track_tones(), feet_px, lines, fans, cells)
