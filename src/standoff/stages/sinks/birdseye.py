@@ -7,21 +7,19 @@ import numpy as np
 
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import GroundMap, ImageArray, NoGroundMap
-from standoff.core.watched_ground import WATCHED, CellArray
 from standoff.stages.sinks.fans import FAN_OPACITY
 from standoff.stages.sinks.ground_window import GroundWindow, camera_up, rectify, seen_ground_m, window_around
 from standoff.stages.sinks.painter import Painter
 from standoff.stages.sinks.palette import bgr
 from standoff.stages.sinks.params import DrawParams
 from standoff.stages.sinks.scene import Scene
-from standoff.stages.sinks.shade import Shade, diagonals, smooth_regions
+from standoff.stages.sinks.shade import GroundShade, diagonals
 from standoff.stages.sinks.sketch import Sketch
 from standoff.stages.sinks.text import TextSprites
 from standoff.stages.sinks.zone_drawing import ZoneDrawing
 
 _OUTSIDE_FOR_S = 2.0
 _DIMMED = 0.72
-_COARSER = 4
 _ANGLES = np.linspace(0.0, 2.0 * np.pi, 49)
 _CIRCLE = np.column_stack([np.cos(_ANGLES), np.sin(_ANGLES)])
 _SCALE_STEPS_M = np.array([0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000])
@@ -42,7 +40,7 @@ class BirdsEye:
         self._params = params or DrawParams()
         self._text = text or TextSprites()
         self._backdrop = _hatched(size_px)
-        self._shade = Shade(size_px)
+        self._shade = GroundShade(size_px)
         self._window: GroundWindow | None = None
         self._all_inside_at_s = -np.inf
 
@@ -66,7 +64,7 @@ class BirdsEye:
             return
         rectify(picture, scene.ground, self._window, panel)
         cv2.convertScaleAbs(panel, dst=panel, alpha=_DIMMED)
-        self._hatch(panel, sketch.cells, scene.ground, self._window)
+        self._shade.draw(panel, sketch.cells, scene.ground, self._window)
         _draw_axes(painter, self._window)
         _draw_scale_bar(painter, panel, self._window)
         window = self._window
@@ -88,19 +86,6 @@ class BirdsEye:
             height, width = self._backdrop.shape[:2]
             self._window = window_around(points, (width, height), camera_up(ground), margin_m=6.0)
             self._all_inside_at_s = scene.time_s
-
-    def _hatch(self, panel: ImageArray, cells: CellArray, ground: GroundMap, window: GroundWindow) -> None:
-        """Draw over the ground in the picture that is not watched what lies over the ground outside of it."""
-        marked = cells > WATCHED
-        if not marked.any():
-            return
-        coarse = window.coarser(_COARSER)
-        opacity = np.zeros(coarse.size_px[::-1], dtype=np.uint8)
-        rectify(smooth_regions(marked), ground, coarse, opacity)
-        height, width = panel.shape[:2]
-        finer = np.asarray(cv2.resize(opacity, None, fx=_COARSER, fy=_COARSER), dtype=np.uint8)
-        self._shade.set(np.ascontiguousarray(finer[:height, :width]))
-        self._shade.draw(panel)
 
     def _draw_entities(self, painter: Painter, sketch: Sketch, window: GroundWindow) -> None:
         at = window.to_window(sketch.scene.positions.xy_m)

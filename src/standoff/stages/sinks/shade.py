@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import cv2
 import numpy as np
 import numpy.typing as npt
 
 from standoff.core.homography import BoolArray, FloatArray
-from standoff.core.types import ImageArray
+from standoff.core.types import GroundMap, ImageArray
 from standoff.core.watched_ground import BEHIND_MACHINE, COLUMNS, ROWS, WATCHED, CellArray
+from standoff.stages.sinks.ground_window import GroundWindow, rectify
 
 Opacity = npt.NDArray[np.uint8]
 
@@ -17,6 +20,7 @@ _STEEPNESS = 3.0
 _DARKER, _LIGHTER = 24, 18
 _LINES_IN_HEIGHT = 42
 _LINE_IN_HEIGHT = 340
+_COARSER = 4
 
 
 def diagonals(size_px: tuple[int, int]) -> Opacity:
@@ -39,7 +43,7 @@ def smooth_regions(marked: BoolArray) -> Opacity:
 
 
 class Shade:
-    """Darken and hatch parts of pictures of one size.
+    """Darken and hatch parts of pictures of one size; what it drew is kept while the parts stay the same.
 
     Args:
         size_px: Their (width, height).
@@ -48,16 +52,22 @@ class Shade:
     def __init__(self, size_px: tuple[int, int]) -> None:
         self.size_px = size_px
         self._lines = diagonals(size_px)
+        self._parts: tuple[bytes, ...] = ()
         self._darker = self._lighter = np.zeros((0, 0, 3), dtype=np.uint8)
 
-    def set(self, opacity: Opacity) -> None:
-        """Take where to draw from now on, (H, W) of 255."""
-        darker = cv2.convertScaleAbs(opacity, alpha=_DARKER / 255.0)
-        lighter = cv2.convertScaleAbs(cv2.bitwise_and(opacity, self._lines), alpha=(_DARKER + _LIGHTER) / 255.0)
-        self._darker, self._lighter = (np.asarray(cv2.merge([one] * 3)) for one in (darker, lighter))
+    def draw(self, canvas: ImageArray, parts: tuple[bytes, ...], opacity: Callable[[], Opacity]) -> None:
+        """Draw over a picture, in place.
 
-    def draw(self, canvas: ImageArray) -> None:
-        """Draw over a picture, in place."""
+        Args:
+            canvas: (H, W, 3) uint8 BGR.
+            parts: All that the opacity depends on.
+            opacity: Gives (H, W) where to draw, of 255.
+        """
+        if parts != self._parts:
+            self._parts, there = parts, opacity()
+            darker = cv2.convertScaleAbs(there, alpha=_DARKER / 255.0)
+            lighter = cv2.convertScaleAbs(cv2.bitwise_and(there, self._lines), alpha=(_DARKER + _LIGHTER) / 255.0)
+            self._darker, self._lighter = (np.asarray(cv2.merge([one] * 3)) for one in (darker, lighter))
         # Dark ground shows the lines, bright ground the shade; both operations saturate, and cost a tenth of a blend.
         cv2.subtract(canvas, self._darker, dst=canvas)
         cv2.add(canvas, self._lighter, dst=canvas)
@@ -71,7 +81,6 @@ class PictureShade:
 
     def __init__(self) -> None:
         self._shade = Shade((0, 0))
-        self._drawn: tuple[bytes, bytes] | None = None
 
     def draw(self, canvas: ImageArray, cells: CellArray, part: FloatArray) -> None:
         """Draw over a picture, in place.
@@ -86,11 +95,47 @@ class PictureShade:
             return
         height, width = canvas.shape[:2]
         if self._shade.size_px != (width, height):
-            self._shade, self._drawn = Shade((width, height)), None
-        if self._drawn != (marked.tobytes(), part.tobytes()):
-            self._drawn = marked.tobytes(), part.tobytes()
+            self._shade = Shade((width, height))
+
+        def opacity() -> Opacity:
             regions = smooth_regions(marked)
             x0, y0, x1, y1 = np.rint(part * np.tile(regions.shape[::-1], 2)).astype(int)
             shown = np.ascontiguousarray(regions[y0 : max(y1, y0 + 1), x0 : max(x1, x0 + 1)])
-            self._shade.set(np.asarray(cv2.resize(shown, (width, height)), dtype=np.uint8))
-        self._shade.draw(canvas)
+            return np.asarray(cv2.resize(shown, (width, height)), dtype=np.uint8)
+
+        self._shade.draw(canvas, (marked.tobytes(), part.tobytes()), opacity)
+
+
+class GroundShade:
+    """Hatch the same ground, and what is behind machines, from above: as the ground outside of the picture looks.
+
+    Args:
+        size_px: (width, height) of the panel.
+    """
+
+    def __init__(self, size_px: tuple[int, int]) -> None:
+        self._shade = Shade(size_px)
+
+    def draw(self, panel: ImageArray, cells: CellArray, ground: GroundMap, window: GroundWindow) -> None:
+        """Draw over the rectified picture, in place.
+
+        Args:
+            panel: (H, W, 3) uint8 BGR.
+            cells: As in `WatchedGround`; (0, 0): nobody judged.
+            ground: The frame's map.
+            window: What the panel shows.
+        """
+        marked = cells > WATCHED
+        if not marked.any():
+            return
+
+        def opacity() -> Opacity:
+            coarse = window.coarser(_COARSER)
+            there = np.zeros(coarse.size_px[::-1], dtype=np.uint8)
+            rectify(smooth_regions(marked), ground, coarse, there)
+            finer = cv2.resize(there, None, fx=_COARSER, fy=_COARSER)
+            return np.ascontiguousarray(finer[: panel.shape[0], : panel.shape[1]], dtype=np.uint8)
+
+        lens = () if ground.camera is None else (ground.camera.matrix, ground.camera.distortion)
+        numbers = marked, ground.image_to_ground, window.ground_to_window, *lens
+        self._shade.draw(panel, tuple(one.tobytes() for one in numbers), opacity)
