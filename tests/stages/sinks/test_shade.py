@@ -184,6 +184,9 @@ def test_the_picture_says_how_much_of_the_ground_is_watched_and_why_not_the_rest
     cells[:9, :16], cells[9, :1] = TOO_SMALL, BLURRED
     words = sketch(result, of_cells(cells)).scene.watched_words()
     assert words == "74 % of the ground watched; rest: workers would be too small"
+    assert sketch(result, of_cells(cells)).scene.watched_words(hatched=True) == words.replace(
+        "rest:", "rest (hatched):"
+    )
     cells[9:, :16] = BEHIND_MACHINE
     cells[:, 20:] = NO_GROUND
     words = sketch(result, of_cells(cells)).scene.watched_words()

@@ -12,7 +12,7 @@ from standoff.stages.sinks.ground_shapes import circle_outlines_px, outlines_in_
 from standoff.stages.sinks.painter import Painter
 from standoff.stages.sinks.palette import Tone, bgr
 from standoff.stages.sinks.params import DrawParams
-from standoff.stages.sinks.scene import ASSISTANCE, Scene
+from standoff.stages.sinks.scene import ASSISTANCE
 from standoff.stages.sinks.shade import PictureShade
 from standoff.stages.sinks.sketch import Sketch
 from standoff.stages.sinks.text import TextSprites
@@ -27,7 +27,6 @@ _LEGEND: tuple[tuple[Tone, str], ...] = (
     ("light", "dashed: not seen now"),
 )
 _ZONE_LEGEND: tuple[Tone, str] = ("zone", "zone")
-_HATCH_LEGEND: tuple[Tone, str] = ("unknown", "hatched: not watched")
 _GRAVENESS: dict[Tone, int] = {"danger": 0, "warning": 1, "unknown": 2}
 
 
@@ -76,10 +75,9 @@ class Overlay:
             _draw_fans(painter, to_canvas, sketch, scene.ground)
         _draw_boxes(painter, to_canvas, sketch)
         _draw_lines(painter, to_canvas, sketch)
-        _draw_status(painter, canvas, scene)
+        _draw_status(painter, canvas, sketch)
         if self._params.legend:
-            more = ([_ZONE_LEGEND] if scene.zones else []) + ([_HATCH_LEGEND] if sketch.cells.size else [])
-            _draw_legend(painter, canvas, (*_LEGEND, *more))
+            _draw_legend(painter, canvas, (*_LEGEND, _ZONE_LEGEND) if scene.zones else _LEGEND)
         if self._params.labels:
             _label_lines(painter, to_canvas, sketch)
             _label_boxes(painter, to_canvas, sketch)
@@ -189,7 +187,8 @@ def _label_boxes(painter: Painter, to_canvas: _ToCanvas, sketch: Sketch) -> None
         painter.label(text, places, accent=bgr(tones[i]), optional=tones[i] != "danger")
 
 
-def _draw_status(painter: Painter, canvas: ImageArray, scene: Scene) -> None:
+def _draw_status(painter: Painter, canvas: ImageArray, sketch: Sketch) -> None:
+    scene = sketch.scene
     minutes, seconds = divmod(scene.time_s, 60.0)
     text = f"{int(minutes):02d}:{seconds:06.3f}   frame {scene.frame_index}"
     if isinstance(scene.ground, GroundMap):
@@ -198,7 +197,7 @@ def _draw_status(painter: Painter, canvas: ImageArray, scene: Scene) -> None:
     margin = painter.font_px // 2
     top = canvas.shape[0] - painter.label_size_px(text)[1] - margin
     step = 1.3 * painter.label_size_px(text)[1]
-    for line in filter(None, (text, scene.watched_words(), ASSISTANCE)):
+    for line in filter(None, (text, scene.watched_words(hatched=sketch.cells.size > 0), ASSISTANCE)):
         painter.label(line, [(margin, top)])
         top -= step
     if isinstance(scene.ground, GroundMap) and scene.zones and not scene.placed_zones:

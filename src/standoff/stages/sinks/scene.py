@@ -141,14 +141,18 @@ class Scene:
         reasons = "; ".join(dict.fromkeys(hazard.reason for hazard in self.stream_hazards))
         return f"UNKNOWN: {reasons}" if reasons else ""
 
-    def watched_words(self) -> str:
-        """Return how much of the ground is watched, and why the rest is not; "" where nobody judged, or without map."""
+    def watched_words(self, *, hatched: bool = False) -> str:
+        """Return how much of the ground is watched, and why the rest is not; "" where nobody judged, or without map.
+
+        Args:
+            hatched: The rest is hatched in the picture, which is told.
+        """
         if not self.watched.judged or isinstance(self.ground, NoGroundMap):
             return ""
         words = f"{percent_text(self.watched.share)} of the ground watched"
         shares = self.watched.unwatched
         reasons = [reason for reason in shares if shares[reason] >= _WORTH_SAYING][:_MOST_REASONS] or list(shares)[:1]
-        return f"{words}; rest: {', '.join(reasons)}" if reasons else words
+        return f"{words}; rest{' (hatched)' * hatched}: {', '.join(reasons)}" if reasons else words
 
     def around_words(self) -> dict[int, str]:
         """Return what to say of each machine with ground about it that is not watched: "60 % around it watched"."""
