@@ -41,6 +41,7 @@ from standoff.stages.sinks import (
 
 RECORD = "run.json"
 ZONES = "zones.geojson"
+_GUESSED = "nobody measured how small a worker the detector finds: which ground is watched is a guess"
 
 
 @dataclass
@@ -156,18 +157,22 @@ def _known_so_far(source: Source, pipeline: Pipeline) -> dict[str, Any]:
     return {
         "source": source.description,
         "ground": getattr(pipeline.ground, "description", None),
+        "watched": getattr(pipeline.watcher, "description", None),
         "alarms": getattr(pipeline.hazard, "description", {}).get("alarms"),
         "warnings": _warnings(source, pipeline),
     }
 
 
 def _warnings(source: Source, pipeline: Pipeline) -> list[str]:
-    return [*source.warnings, *stage_warnings(pipeline.detector, pipeline.motion, pipeline.ground, pipeline.hazard)]
+    stages = (pipeline.detector, pipeline.motion, pipeline.ground, pipeline.watcher, pipeline.hazard)
+    return [*source.warnings, *stage_warnings(*stages)]
 
 
 def stage_warnings(*stages: object) -> list[str]:
     """Return what stages say of their own set-up, and of what they have seen so far."""
-    return [text for stage in stages for text in getattr(stage, "description", {}).get("warnings", ())]
+    described = [getattr(stage, "description", {}) for stage in stages]
+    guessed = [_GUESSED for one in described if one.get("measured") is False]
+    return [*(text for one in described for text in one.get("warnings", ())), *guessed]
 
 
 def _refuse_to_replace(source: Path, out: Path, what: str) -> None:

@@ -3,6 +3,7 @@ from __future__ import annotations
 import html
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -29,8 +30,14 @@ OUTPUTS = {
 }  # fmt: skip
 
 
+FINDS = {"finds_workers": {"height_px": [4.0, 8.0, 16.0], "share": [0.5, 0.95, 0.95]}}
+"""What a detector says of itself that finds workers seen from straight above in a small picture."""
+
+
 class Approach:
     """A detector that sees a worker walk towards an excavator."""
+
+    description = FINDS
 
     def detect(self, frame: Frame) -> Detections:
         left = 20.0 + 60.0 * frame.time_s
@@ -62,6 +69,7 @@ def test_a_run_writes_every_output_and_finds_the_hazard(call: Call, video: Path,
     code, out, err = call("run", video, "--config", site, "--out", tmp_path / "out")
     assert (code, err) == (0, "")
     assert "complete" in out
+    assert re.search(r"ground watched +\d+ %", out)
     assert {path.name for path in (tmp_path / "out").iterdir()} == OUTPUTS | {"report.html"}
     distances = pq.read_table(tmp_path / "out" / "proximity.parquet").to_pydict()
     expected_m = (270.0 - (26.0 + 60.0 * np.array(distances["time_s"]))) / 20.0
@@ -74,6 +82,12 @@ def test_a_run_writes_every_output_and_finds_the_hazard(call: Call, video: Path,
     record = json.loads((tmp_path / "out" / "run.json").read_text())
     assert record["status"] == "complete"
     assert record["counts"]["frames"] == record["counts"]["frames_with_map"] == 34
+    assert record["watched"] == {
+        "worker_height_px": [4.0, 8.0, 16.0],
+        "found_share": [0.5, 0.95, 0.95],
+        "measured": True,
+    }
+    assert record["watched_ground"]["share"] > 0.9
     assert record["settings"]["locate"]["radius_m"] == {"worker": 1.0, "excavator": 3.0}
 
 

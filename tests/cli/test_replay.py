@@ -13,7 +13,7 @@ import pytest
 import tolerances
 import yaml
 from cli.calling import Call
-from cli.test_cli import make_video
+from cli.test_cli import FINDS, make_video
 
 from standoff.config import load_settings
 from standoff.core.types import Detections, Frame
@@ -36,7 +36,7 @@ SELECTIONS: dict[str, dict[str, float]] = {
 class Unsure:
     """A detector of two people and an excavator: boxes a little off, now and then one missing or nothing at all."""
 
-    description = {"model": "unsure", "class_map": {"man": "worker", "digger": "excavator"}}  # noqa: RUF012
+    description = {"model": "unsure", "class_map": {"man": "worker", "digger": "excavator"}} | FINDS
 
     def detect(self, frame: Frame) -> Detections:
         if frame.index in NOTHING_SEEN:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import yaml
 from cli.calling import Call
-from cli.test_cli import make_video
+from cli.test_cli import FINDS, make_video
 from files.test_zone_file import collection, feature
 from pages import PageReader
 
@@ -21,6 +21,8 @@ RING = [[5.0, 5.0], [8.0, 5.0], [8.0, 7.0], [5.0, 7.0], [5.0, 5.0]]
 
 class Walk:
     """A detector that sees a worker walk through the picture at 3 m/s, along y = 5.5 m."""
+
+    description = FINDS
 
     def detect(self, frame: Frame) -> Detections:
         left = 20.0 + 60.0 * frame.time_s

@@ -173,6 +173,7 @@ def tell(ended: Run, *, as_json: bool, quiet: bool) -> None:
     """Print the record, or a summary of it."""
     from standoff.cli.console import print_table, write_json
     from standoff.core.lengths import UNITS
+    from standoff.stages.sinks import percent_text
 
     record = ended.record
     if as_json:
@@ -182,6 +183,7 @@ def tell(ended: Run, *, as_json: bool, quiet: bool) -> None:
         rows = [
             ("frames", f"{counts['frames']}"),
             ("frames with a ground map", f"{counts['frames_with_map']}"),
+            ("ground watched", percent_text(record["watched_ground"]["share"])),
             ("tracks", f"{counts['tracks']}"),
             ("distances measured", f"{counts['measured_distances']} of {counts['distances']}"),
             ("hazards", ", ".join(f"{number} {name}" for name, number in hazards.items()) or "none"),

@@ -39,7 +39,8 @@ class WorkerFinding:
     @classmethod
     def of_detector(cls, description: Mapping[str, Any]) -> WorkerFinding:
         """Read what a detector says of itself; what is replayed was found by the detector that was recorded."""
-        description = description.get("detector", description)
+        while "detector" in description:
+            description = description["detector"]
         told = description.get(KEY)
         guess = cls(
             input_size_px=tuple(description.get("input_size_px") or (0, 0)),

@@ -16,6 +16,7 @@ from standoff.stages.sinks.tables import (
     tracks_table,
 )
 from standoff.stages.sinks.video import Composer, VideoSink
+from standoff.stages.sinks.watched_shares import percent_text
 
 __all__ = [
     "DETECTIONS",
@@ -36,6 +37,7 @@ __all__ = [
     "VideoParams",
     "VideoSink",
     "detections_table",
+    "percent_text",
     "prepare_output",
     "tracks_table",
 ]

@@ -14,6 +14,7 @@ from standoff.stages.sinks.painter import Painter
 from standoff.stages.sinks.palette import bgr
 from standoff.stages.sinks.params import DrawParams
 from standoff.stages.sinks.scene import Scene
+from standoff.stages.sinks.shade import GroundShade, diagonals
 from standoff.stages.sinks.sketch import Sketch
 from standoff.stages.sinks.text import TextSprites
 from standoff.stages.sinks.zone_drawing import ZoneDrawing
@@ -39,6 +40,7 @@ class BirdsEye:
         self._params = params or DrawParams()
         self._text = text or TextSprites()
         self._backdrop = _hatched(size_px)
+        self._shade = GroundShade(size_px)
         self._window: GroundWindow | None = None
         self._all_inside_at_s = -np.inf
 
@@ -62,6 +64,7 @@ class BirdsEye:
             return
         rectify(picture, scene.ground, self._window, panel)
         cv2.convertScaleAbs(panel, dst=panel, alpha=_DIMMED)
+        self._shade.draw(panel, sketch.cells, scene.ground, self._window)
         _draw_axes(painter, self._window)
         _draw_scale_bar(painter, panel, self._window, sketch.unit)
         window = self._window
@@ -121,9 +124,7 @@ def _label_dots(painter: Painter, sketch: Sketch, at_px: FloatArray, placed: Boo
 
 def _hatched(size_px: tuple[int, int]) -> ImageArray:
     """Return the ground that no camera sees: dark grey with thin diagonals."""
-    width, height = size_px
-    x, y = np.meshgrid(np.arange(width), np.arange(height))
-    stripes = ((x + y) % 14 < 2)[:, :, None]
+    stripes = diagonals(size_px)[:, :, None] > 0
     return np.where(stripes, (50, 45, 41), (35, 31, 28)).astype(np.uint8)
 
 

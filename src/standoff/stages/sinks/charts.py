@@ -165,6 +165,24 @@ def pair_charts(summary: RunSummary, warning_gap_m: float) -> str:
         return inline_svg(figure)
 
 
+def watched_chart(summary: RunSummary) -> str:
+    """Draw which share of the ground was watched over time; empty when nobody judged."""
+    if not summary.watched.frames:
+        return ""
+    with themed_figure(10.0, 1.6) as figure:
+        axes = figure.add_subplot()
+        time_s, percent = summary.watched_share.column("time_s"), 100.0 * summary.watched_share.column("gap_m")
+        axes.fill_between(time_s, percent, color=HEX["worker"], alpha=0.25, linewidth=0)
+        axes.fill_between(
+            time_s, percent, 100.0, facecolor="none", edgecolor=MUTED, alpha=0.6, hatch="////", linewidth=0
+        )
+        axes.plot(time_s, percent, color=INK, linewidth=1.4)
+        axes.set_ylabel("watched, %")
+        axes.set_ylim(0.0, 100.0)
+        _finish_time_axis(axes, summary)
+        return inline_svg(figure)
+
+
 def plan_chart(summary: RunSummary) -> str:
     """Draw where everything went, seen from above, x to the right; empty when nothing was placed."""
     paths = [path for path in summary.paths.values() if np.isfinite(path.points_m).any()]

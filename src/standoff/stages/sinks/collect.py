@@ -16,6 +16,7 @@ from standoff.stages.sinks.moments import WorstMoments
 from standoff.stages.sinks.params import ReportParams, ShowParams
 from standoff.stages.sinks.scene import OpenHazards, Pair, Scene, worse
 from standoff.stages.sinks.series import Path, Series
+from standoff.stages.sinks.watched_shares import WatchedShares
 
 _MOST_HAZARDS = 5000
 _MOST_PATHS = 150
@@ -91,6 +92,8 @@ class RunSummary:
         self.moments = WorstMoments(params.moments, params.moment_width_px)
         self.site = Series()
         self.no_map = Series()
+        self.watched = WatchedShares()
+        self.watched_share = Series()
         self.pairs: dict[Pair, Series] = {}
         self.pair_names: dict[Pair, tuple[str, str]] = {}
         self.paths: dict[int, Path] = {}
@@ -110,6 +113,9 @@ class RunSummary:
         scene = Scene.of(result, self._open, self.zones, self._people.update(result))
         self._count(result)
         self._add_ground(frame, scene)
+        self.watched.add(result.watched)
+        # Of frames that share a sample the one with the least share is kept, as is the closest of a pair.
+        self.watched_share.add(frame.time_s, result.watched.share, float("nan"), float("nan"))
         self._add_paths(scene)
         self._add_pairs(scene)
         self._add_hazards(result.hazards, scene)

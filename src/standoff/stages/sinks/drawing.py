@@ -5,14 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from standoff.core.homography import FloatArray
-from standoff.core.types import GroundMap, ImageArray, NoGroundMap
+from standoff.core.types import GroundMap, ImageArray
 from standoff.core.zones import NOT_PLACED
 from standoff.stages.sinks.fans import FAN_OPACITY
 from standoff.stages.sinks.ground_shapes import circle_outlines_px, outlines_in_sight_px
 from standoff.stages.sinks.painter import Painter
 from standoff.stages.sinks.palette import Tone, bgr
 from standoff.stages.sinks.params import DrawParams
-from standoff.stages.sinks.scene import ASSISTANCE, Scene
+from standoff.stages.sinks.scene import ASSISTANCE
+from standoff.stages.sinks.shade import PictureShade
 from standoff.stages.sinks.sketch import Sketch
 from standoff.stages.sinks.text import TextSprites
 from standoff.stages.sinks.zone_drawing import ZoneDrawing
@@ -40,6 +41,7 @@ class Overlay:
     def __init__(self, params: DrawParams | None = None, text: TextSprites | None = None) -> None:
         self._params = params or DrawParams()
         self._text = text or TextSprites()
+        self._shade = PictureShade()
 
     def draw(self, canvas: ImageArray, sketch: Sketch, region_px: FloatArray | None = None) -> None:
         """Draw over a picture, in place.
@@ -52,11 +54,14 @@ class Overlay:
         """
         scene = sketch.scene
         painter = Painter(canvas, self._text, self._params.size)
-        to_canvas = _ToCanvas(canvas, region_px if region_px is not None else np.array([0.0, 0.0, *scene.size_px]))
+        if region_px is None:
+            region_px = np.array([0.0, 0.0, *scene.size_px])
+        to_canvas = _ToCanvas(canvas, region_px)
         zones = None
-        if isinstance(scene.ground, NoGroundMap):
-            _draw_banner(painter, canvas, scene.ground.reason)
-        else:
+        self._shade.draw(canvas, sketch.cells, region_px / np.tile(scene.size_px, 2))
+        if words := scene.unknown_words():
+            _draw_banner(painter, canvas, words)
+        if isinstance(scene.ground, GroundMap):
             ground, (height, width) = scene.ground, canvas.shape[:2]
             zones = ZoneDrawing(
                 scene,
@@ -70,7 +75,7 @@ class Overlay:
             _draw_fans(painter, to_canvas, sketch, scene.ground)
         _draw_boxes(painter, to_canvas, sketch)
         _draw_lines(painter, to_canvas, sketch)
-        _draw_status(painter, canvas, scene)
+        _draw_status(painter, canvas, sketch)
         if self._params.legend:
             _draw_legend(painter, canvas, (*_LEGEND, _ZONE_LEGEND) if scene.zones else _LEGEND)
         if self._params.labels:
@@ -92,12 +97,12 @@ class _ToCanvas:
         return scaled
 
 
-def _draw_banner(painter: Painter, canvas: ImageArray, reason: str) -> None:
+def _draw_banner(painter: Painter, canvas: ImageArray, text: str) -> None:
     height, width = canvas.shape[:2]
     bar = canvas[: round(2.4 * painter.font_px)]
     bar[:] = (bar * 0.12 + np.array(bgr("danger")) * 0.7).astype(np.uint8)
     painter.reserve((0, 0, width, len(bar)))
-    painter.title(f"NO MEASUREMENT: {reason}", (painter.font_px, round(0.6 * painter.font_px)))
+    painter.title(text, (painter.font_px, round(0.6 * painter.font_px)))
     painter.box(np.array([1, 1, width - 2, height - 2]), bgr("danger"))
 
 
@@ -164,8 +169,11 @@ def _label_lines(painter: Painter, to_canvas: _ToCanvas, sketch: Sketch) -> None
 def _label_boxes(painter: Painter, to_canvas: _ToCanvas, sketch: Sketch) -> None:
     scene, tones = sketch.scene, sketch.tones
     corners = to_canvas(scene.tracks.xyxy_px).reshape(-1, 4)
-    in_zones = scene.zone_words()
-    names = [f"{name}, {in_zones[track]}" if track in in_zones else name for track, name in scene.names().items()]
+    remarks = scene.zone_words(), scene.around_words()
+    names = [
+        ", ".join([name, *(words[track] for words in remarks if track in words)])
+        for track, name in scene.names().items()
+    ]
     has_map = isinstance(scene.ground, GroundMap)
     for i in sorted(range(len(tones)), key=lambda row: _GRAVENESS.get(tones[row], len(_GRAVENESS))):
         if not painter.shows(corners[i]):
@@ -179,7 +187,8 @@ def _label_boxes(painter: Painter, to_canvas: _ToCanvas, sketch: Sketch) -> None
         painter.label(text, places, accent=bgr(tones[i]), optional=tones[i] != "danger")
 
 
-def _draw_status(painter: Painter, canvas: ImageArray, scene: Scene) -> None:
+def _draw_status(painter: Painter, canvas: ImageArray, sketch: Sketch) -> None:
+    scene = sketch.scene
     minutes, seconds = divmod(scene.time_s, 60.0)
     text = f"{int(minutes):02d}:{seconds:06.3f}   frame {scene.frame_index}"
     if isinstance(scene.ground, GroundMap):
@@ -187,14 +196,13 @@ def _draw_status(painter: Painter, canvas: ImageArray, scene: Scene) -> None:
         text += f"   map: {scene.ground.method}{age}"
     margin = painter.font_px // 2
     top = canvas.shape[0] - painter.label_size_px(text)[1] - margin
-    painter.label(text, [(margin, top)])
-    top -= 1.3 * painter.label_size_px(ASSISTANCE)[1]
-    painter.label(ASSISTANCE, [(margin, top)])
+    step = 1.3 * painter.label_size_px(text)[1]
+    for line in filter(None, (text, scene.watched_words(hatched=sketch.cells.size > 0), ASSISTANCE)):
+        painter.label(line, [(margin, top)])
+        top -= step
     if isinstance(scene.ground, GroundMap) and scene.zones and not scene.placed_zones:
         unknown = f"ZONES UNKNOWN: {NOT_PLACED}"
-        painter.label(
-            unknown, [(margin, top - 1.3 * painter.label_size_px(unknown)[1])], accent=bgr("unknown"), bold=True
-        )
+        painter.label(unknown, [(margin, top)], accent=bgr("unknown"), bold=True)
 
 
 def _draw_legend(painter: Painter, canvas: ImageArray, legend: tuple[tuple[Tone, str], ...]) -> None:

@@ -42,6 +42,15 @@ class GroundWindow:
         points_px: FloatArray = points_m @ self.ground_to_window[:2, :2].T + self.ground_to_window[:2, 2]
         return points_px
 
+    def coarser(self, times: int) -> GroundWindow:
+        """Return a window on the same ground with so many times fewer pixels both ways; the last may stand out."""
+        width, height = self.size_px
+        fewer = np.diag([1.0 / times, 1.0 / times, 1.0])
+        # Pixel centres are whole numbers in both.
+        fewer[:2, 2] = 0.5 / times - 0.5
+        size_px = -(-width // times), -(-height // times)
+        return GroundWindow(fewer @ self.ground_to_window, size_px, times * self.m_per_px)
+
     def covers(self, points_m: FloatArray) -> BoolArray:
         """Return (N,) whether each point lies in the window."""
         points_px = self.to_window(points_m)
@@ -107,10 +116,10 @@ def rectify(picture: ImageArray, ground: GroundMap, window: GroundWindow, onto: 
     """Warp a frame onto the ground plane.
 
     Args:
-        picture: (H, W, 3) uint8, the frame at any size.
+        picture: (H, W, 3) or (H, W) uint8, the frame at any size.
         ground: Its map.
         window: What to show.
-        onto: (h, w, 3) uint8 of the window's size, written to where the camera sees the ground.
+        onto: (h, w, 3) or (h, w) uint8 of the window's size, written to where the camera sees the ground.
 
     Source:
         Paper, section 5.1, Eq. 5.

@@ -44,6 +44,7 @@ class DrawParams:
     size: Annotated[float, Interval(ge=0.3, le=4), Doc("Factor on the usual size of text and lines.")] = 1.0
     circles: Annotated[bool, Doc("Draw the action radii, as the ellipses that they are in the picture.")] = True
     fans: Annotated[bool, Doc("Draw where moving entities are likely to be within two seconds.")] = True
+    unwatched: Annotated[bool, Doc("Hatch the ground on which a worker would not be found.")] = True
     labels: Annotated[bool, Doc("Draw class names, ids, distances and the names of zones.")] = True
     legend: Annotated[bool, Doc("Draw what the colours mean.")] = True
 

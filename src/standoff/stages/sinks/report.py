@@ -84,7 +84,7 @@ def render(
 ) -> str:
     """Return the page."""
     # matplotlib takes long to load; a run starts without it, and whoever imports another sink does not need it
-    from standoff.stages.sinks.charts import clock, pair_charts, plan_chart, site_chart
+    from standoff.stages.sinks.charts import clock, pair_charts, plan_chart, site_chart, watched_chart
 
     folder = files("standoff.stages.sinks")
     environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True)
@@ -106,6 +106,8 @@ def render(
         hazards_left_out=max(0, len(hazards) - _MOST_ROWS) + summary.counts["hazards_left_out"],
         severities=Counter(hazard.severity for hazard in hazards),
         site_chart=Markup(site_chart(summary, warning_gap_m)) if has_frames else "",
+        watched_chart=Markup(watched_chart(summary)),
+        guessed=(descriptions.get("watched") or {}).get("measured") is False,
         pair_charts=Markup(pair_charts(summary, warning_gap_m)),
         plan_chart=Markup(plan_chart(summary)),
         zones=[_zone_row(zone, summary) for zone in summary.zones],

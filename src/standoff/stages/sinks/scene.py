@@ -18,13 +18,19 @@ from standoff.core.types import (
     Proximities,
     Severity,
     Tracks,
+    WatchedGround,
 )
 from standoff.core.zones import Zone
 from standoff.stages.sinks.palette import Tone, class_tone
+from standoff.stages.sinks.watched_shares import around_tracks, percent_text
 
 Pair = tuple[int, int]
 
 _GRAVENESS: tuple[Severity, ...] = ("unknown", "warning", "danger")
+_WELL_WATCHED = 0.9
+"""From this share on nothing is said of the circle about a machine."""
+_WORTH_SAYING = 0.05
+_MOST_REASONS = 2
 
 
 class OpenHazards:
@@ -50,6 +56,10 @@ class OpenHazards:
         """Return the open hazards of zones."""
         return tuple(e for e in self._open.values() if e.zone)
 
+    def of_stream(self) -> tuple[Hazard, ...]:
+        """Return the open hazards of the stream as a whole, which cannot be measured."""
+        return tuple(e for e in self._open.values() if e.rule == "measurement")
+
 
 ASSISTANCE = "Assistance only: no certified safety function, no replacement for a banksman or an exclusion zone"
 
@@ -70,6 +80,8 @@ class Scene:
         zones: All of the site.
         zone_hazards: Open hazards of zones.
         hidden_px: (N, 4) boxes of the picture to be made unrecognisable, in full-size pixels.
+        watched: Where on the ground a worker would be found.
+        stream_hazards: Open hazards of the stream as a whole.
     """
 
     frame_index: int
@@ -83,6 +95,8 @@ class Scene:
     zones: tuple[Zone, ...] = ()
     zone_hazards: tuple[Hazard, ...] = ()
     hidden_px: FloatArray = field(default_factory=lambda: np.zeros((0, 4)))
+    watched: WatchedGround = field(default_factory=WatchedGround)
+    stream_hazards: tuple[Hazard, ...] = ()
 
     @classmethod
     def of(
@@ -105,6 +119,8 @@ class Scene:
             zones=zones,
             zone_hazards=open_hazards.in_zones() if zones else (),
             hidden_px=np.zeros((0, 4)) if hidden_px is None else hidden_px,
+            watched=result.watched,
+            stream_hazards=open_hazards.of_stream(),
         )
 
     @property
@@ -126,6 +142,34 @@ class Scene:
             for track_id in hazard.track_ids:
                 words.setdefault(track_id, []).append(f"{where} {hazard.zone}")
         return {track_id: ", ".join(dict.fromkeys(texts)) for track_id, texts in words.items()}
+
+    def unknown_words(self) -> str:
+        """Return why the whole picture is unknown, or much of it: for a bar across it; "" where it is not."""
+        if isinstance(self.ground, NoGroundMap):
+            return f"NO MEASUREMENT: {self.ground.reason}"
+        reasons = "; ".join(dict.fromkeys(hazard.reason for hazard in self.stream_hazards))
+        return f"UNKNOWN: {reasons}" if reasons else ""
+
+    def watched_words(self, *, hatched: bool = False) -> str:
+        """Return how much of the ground is watched, and why the rest is not; "" where nobody judged, or without map.
+
+        Args:
+            hatched: The rest is hatched in the picture, which is told.
+        """
+        if not self.watched.judged or isinstance(self.ground, NoGroundMap):
+            return ""
+        words = f"{percent_text(self.watched.share)} of the ground watched"
+        shares = self.watched.unwatched
+        reasons = [reason for reason in shares if shares[reason] >= _WORTH_SAYING][:_MOST_REASONS] or list(shares)[:1]
+        return f"{words}; rest{' (hatched)' * hatched}: {', '.join(reasons)}" if reasons else words
+
+    def around_words(self) -> dict[int, str]:
+        """Return what to say of each machine with ground about it that is not watched: "60 % around it watched"."""
+        around = around_tracks(self.watched, len(self.tracks))
+        return {
+            int(self.tracks.track_id[row]): f"{percent_text(around[row])} around it watched"
+            for row in np.flatnonzero(around < _WELL_WATCHED)
+        }
 
     def track_tones(self) -> list[Tone]:
         """Return the colour of each track: of its gravest hazard, else of its class; grey when it has no position."""

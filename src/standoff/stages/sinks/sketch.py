@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from standoff.core.homography import FloatArray
 from standoff.core.lengths import METRES, LengthUnit
+from standoff.core.types import GroundMap
+from standoff.core.watched_ground import CellArray
 from standoff.stages.sinks.fans import Fan, fans_of
 from standoff.stages.sinks.pair_lines import PairLine, pair_lines
 from standoff.stages.sinks.palette import Tone
@@ -24,6 +28,7 @@ class Sketch:
         lines: Pairs to draw, gravest first.
         fans: What is ahead of those who move.
         unit: What lengths are said in.
+        cells: Ground to hatch, as in `WatchedGround`; (0, 0): none, or the whole picture is unknown.
     """
 
     scene: Scene
@@ -32,6 +37,7 @@ class Sketch:
     lines: list[PairLine]
     fans: list[Fan]
     unit: LengthUnit
+    cells: CellArray
 
     @classmethod
     def of(cls, scene: Scene, params: DrawParams, unit: LengthUnit = METRES) -> Sketch:
@@ -39,4 +45,6 @@ class Sketch:
         feet_px = scene.feet_px()
         fans = fans_of(scene.positions) if params.fans else []
         lines = pair_lines(scene, feet_px, params.line_within_m, unit)
-        return cls(scene, scene.track_tones(), feet_px, lines, fans, unit)
+        hatched = params.unwatched and isinstance(scene.ground, GroundMap)
+        cells = scene.watched.cells if hatched else np.zeros((0, 0), dtype=np.int8)
+        return cls(scene, scene.track_tones(), feet_px, lines, fans, unit, cells)

@@ -23,6 +23,7 @@ from standoff.files.json_text import plain
 from standoff.stages.sinks.params import TableParams
 from standoff.stages.sinks.parquet_parts import Columns, ParquetParts
 from standoff.stages.sinks.scene import OpenHazards
+from standoff.stages.sinks.watched_shares import around_tracks
 
 _CLASS = pa.dictionary(pa.int32(), pa.string())
 _NAMES: TextArray = np.array([site_class.name for site_class in CLASSES], dtype=object)
@@ -165,16 +166,11 @@ def _track_rows(result: FrameResult) -> Columns:
         "cov_xy_m2": variance[:, 0, 1],
         "radius_m": positions.radius_m,
         "standing_s": positions.standing_s,
-        "around_watched": _around(result),
+        "around_watched": around_tracks(result.watched, len(result.tracks)),
         "sight": _sight(result),
         "valid": positions.valid,
         "reason": positions.reason,
     }
-
-
-def _around(result: FrameResult) -> FloatArray:
-    around = result.watched.around
-    return around if len(around) == len(result.tracks) else np.full(len(result.tracks), np.nan)
 
 
 def _sight(result: FrameResult) -> TextArray:

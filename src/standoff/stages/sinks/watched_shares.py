@@ -2,10 +2,28 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from typing import Any
 
+import numpy as np
+
+from standoff.core.homography import FloatArray
 from standoff.core.types import WatchedGround
+
+
+def percent_text(share: float | None) -> str:
+    """Return a share in whole percent, rounded down: only all of it is 100 %.
+
+    >>> percent_text(0.745), percent_text(0.999), percent_text(1.0), percent_text(None)
+    ('74 %', '99 %', '100 %', 'unknown')
+    """
+    return "unknown" if share is None or math.isnan(share) else f"{math.floor(100.0 * share + 1e-9)} %"
+
+
+def around_tracks(watched: WatchedGround, count: int) -> FloatArray:
+    """Return (count,) what share of the circle about each track is watched; NaN of all where nobody judged."""
+    return watched.around if len(watched.around) == count else np.full(count, np.nan)
 
 
 class WatchedShares:
@@ -13,12 +31,13 @@ class WatchedShares:
 
     Attributes:
         frames: How many they are.
+        frames_watched: In how many of them some ground is watched.
     """
 
     def __init__(self) -> None:
         self.frames = 0
         self._share = self._missed = 0.0
-        self._frames_watched = 0
+        self.frames_watched = 0
         self._unwatched: Counter[str] = Counter()
 
     def add(self, watched: WatchedGround) -> None:
@@ -30,7 +49,7 @@ class WatchedShares:
         self._unwatched.update(watched.unwatched)
         if watched.watched.any():
             self._missed += watched.missed_share
-            self._frames_watched += 1
+            self.frames_watched += 1
 
     @property
     def share(self) -> float:
@@ -45,7 +64,7 @@ class WatchedShares:
     @property
     def missed_share(self) -> float:
         """Of the workers on watched ground, how many are missed in one picture; NaN where none was watched."""
-        return self._missed / self._frames_watched if self._frames_watched else float("nan")
+        return self._missed / self.frames_watched if self.frames_watched else float("nan")
 
     def summary(self) -> dict[str, Any]:
         """Return all of it for the record, to a tenth of a percent."""
