@@ -41,7 +41,6 @@ from standoff.stages.sinks import (
 
 RECORD = "run.json"
 ZONES = "zones.geojson"
-_GUESSED = "nobody measured how small a worker the detector finds: which ground is watched is a guess"
 
 
 @dataclass
@@ -170,9 +169,7 @@ def _warnings(source: Source, pipeline: Pipeline) -> list[str]:
 
 def stage_warnings(*stages: object) -> list[str]:
     """Return what stages say of their own set-up, and of what they have seen so far."""
-    described = [getattr(stage, "description", {}) for stage in stages]
-    guessed = [_GUESSED for one in described if one.get("measured") is False]
-    return [*(text for one in described for text in one.get("warnings", ())), *guessed]
+    return [text for stage in stages for text in getattr(stage, "description", {}).get("warnings", ())]
 
 
 def _refuse_to_replace(source: Path, out: Path, what: str) -> None:

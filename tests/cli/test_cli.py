@@ -86,6 +86,7 @@ def test_a_run_writes_every_output_and_finds_the_hazard(call: Call, video: Path,
         "worker_height_px": [4.0, 8.0, 16.0],
         "found_share": [0.5, 0.95, 0.95],
         "measured": True,
+        "warnings": [],
     }
     assert record["watched_ground"]["share"] > 0.9
     assert record["settings"]["locate"]["radius_m"] == {"worker": 1.0, "excavator": 3.0}

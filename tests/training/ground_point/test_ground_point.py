@@ -9,14 +9,13 @@ import pytest
 
 from standoff.core.errors import DataError
 from standoff.core.homography import FloatArray
+from standoff.core.types import ImageArray
 from standoff.stages.detect.point_crops import CROP_PX, POINT_CLASSES
 from standoff.training.ground_point import Patches, PointTraining, measure_points, read_patches, train_points
 from standoff.training.ground_point.crops import PATCH_PX, drawn_crop, middle_crop
 from standoff.training.pictures.augment_params import AugmentParams
 
-UNTOUCHED = replace(
-    AugmentParams(), **dict.fromkeys(("shadows", "colour", "blur", "lost_detail", "noise", "jpeg"), 0.0)
-)
+UNTOUCHED = replace(AugmentParams(), shadows=0.0, colour=0.0, blur=0.0, lost_detail=0.0, noise=0.0, jpeg=0.0)
 EXCAVATOR = POINT_CLASSES.index("excavator")
 
 
@@ -25,14 +24,14 @@ def dots(count: int, seed: int) -> Patches:
     rng = np.random.default_rng(seed)
     images = rng.integers(60, 110, (count, PATCH_PX, PATCH_PX, 3)).astype(np.uint8)
     places_px = rng.uniform(0.3 * PATCH_PX, 0.7 * PATCH_PX, (count, 2))
-    rows, columns = np.mgrid[:PATCH_PX, :PATCH_PX] + 0.5
+    columns, rows = np.meshgrid(np.arange(PATCH_PX) + 0.5, np.arange(PATCH_PX) + 0.5)
     for image, (x, y) in zip(images, places_px, strict=True):
         image[(columns - x) ** 2 + (rows - y) ** 2 < 8**2] = 250
     return Patches(images, places_px / PATCH_PX, np.full(count, EXCAVATOR), np.full(count, 100.0))
 
 
-def blob_middle(image: FloatArray) -> FloatArray:
-    rows, columns = np.mgrid[:CROP_PX, :CROP_PX] + 0.5
+def blob_middle(image: ImageArray) -> FloatArray:
+    columns, rows = np.meshgrid(np.arange(CROP_PX) + 0.5, np.arange(CROP_PX) + 0.5)
     bright = image.max(axis=2) > 180
     return np.array([columns[bright].mean(), rows[bright].mean()]) / CROP_PX
 

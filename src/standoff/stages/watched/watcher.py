@@ -35,6 +35,7 @@ from standoff.stages.watched.params import WatchedParams
 from standoff.stages.watched.quality import PictureQuality, picture_quality
 
 _PARTS: Final = (ROWS // 2, COLUMNS // 2)
+_GUESSED: Final = "nobody measured how small a worker the detector finds: which ground is watched is a guess"
 _FOOT_LEVEL: Final = 0.8
 """Where a machine without a ground point stands in its box: what is higher up in the box may be behind it."""
 _MOST_PERCENT: Final = 90.0
@@ -71,7 +72,7 @@ class GroundWatcher:
         self._judged_s = -math.inf
         self._cells: CellArray = np.zeros((ROWS, COLUMNS), dtype=np.int8)
         self._found: FloatArray = np.zeros((ROWS, COLUMNS))
-        self._judged = self._judged_small = 0
+        self._looks = self._judged = self._judged_small = 0
         self._usual_px = 0.0
 
     @property
@@ -86,14 +87,16 @@ class GroundWatcher:
         }
 
     def _warnings(self) -> list[str]:
-        """Return what would make ground watched that is not."""
-        if 2 * self._judged_small <= self._judged:
-            return []
+        """Return that the heights are a guess, and what would make ground watched that is not."""
+        guessed = [] if self._finding.measured else [_GUESSED]
+        if 2 * self._judged_small <= self._looks:
+            return guessed
         usual_px, share = self._usual_px / self._judged, self._params.found_share
         least_px = self._finding.least_height_px(share)
         return [
+            *guessed,
             f"most ground is not watched: a worker there is about {usual_px:.0f} px tall in the detector's input, and "
-            f"{share:.0%} of them are found from {least_px:.0f} px on: fly lower, zoom in, or set detect.slices"
+            f"{share:.0%} of them are found from {least_px:.0f} px on: fly lower, zoom in, or set detect.slices",
         ]
 
     def update(
@@ -110,10 +113,12 @@ class GroundWatcher:
         nothing = np.full((ROWS, COLUMNS), np.nan)
         if isinstance(ground, NoGroundMap):
             self._judged_s = -math.inf
+            self._looks += 1
             cells = np.full((ROWS, COLUMNS), NO_MAP, dtype=np.int8)
             return WatchedGround(cells, nothing, np.full(len(tracks), np.nan))
         if frame.time_s - self._judged_s >= self._params.judge_every_s - _TIME_ROUNDING_S:
             self._judge(frame, ground)
+            self._looks += 1
             self._judged_s = frame.time_s
         cells = self._cells.copy()
         cells[self._behind_machines(tracks, frame.size_px) & (cells == WATCHED)] = BEHIND_MACHINE
