@@ -40,7 +40,7 @@ def points_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_every_class_has_its_own_points_and_the_reference_none(points_file: Path) -> None:
     network = PointNetwork(points_file, "cpu", 1)
     image = np.random.default_rng(0).integers(0, 256, (200, 300, 3)).astype(np.uint8)
-    boxes_px = np.array([[20.0, 30.0, 60.0, 110.0], [100.0, 20.0, 160.0, 60.0], [200.0, 100.0, 299.0, 199.0]])
+    boxes_px = np.array([[20.0, 30.0, 60.0, 110.0], [100.0, 20.0, 160.0, 60.0], [200.0, 100.0, 290.0, 190.0]])
     for name in POINT_CLASSES:
         class_id = np.array([CLASS_BY_NAME[name].id, CLASS_BY_NAME["reference"].id, CLASS_BY_NAME[name].id])
         points_px, sigma_px = network.points(image, boxes_px, class_id)
@@ -50,6 +50,13 @@ def test_every_class_has_its_own_points_and_the_reference_none(points_file: Path
         expected_px = middle_px + (PLACES[POINT_CLASSES.index(name)] - 0.5) * side_px[:, None]
         np.testing.assert_allclose(points_px[[0, 2]], expected_px[[0, 2]], atol=1.0)
         np.testing.assert_allclose(sigma_px[[0, 2]] / side_px[[0, 2], None], STRETCH * np.exp(-2.0), rtol=0.03)
+    for box_px in ([-0.5, 30.0, 60.0, 110.0], [20.0, 30.0, 299.5, 110.0], [20.0, 100.0, 60.0, 199.5]):
+        whole_px = np.array([[20.0, 30.0, 60.0, 110.0]])
+        cut_px = np.array([box_px])
+        sigmas = [network.points(image, box, np.zeros(1, dtype=np.int64))[1] for box in (whole_px, cut_px)]
+        sides = [float((box[:, 2:] - box[:, :2]).max()) for box in (whole_px, cut_px)]
+        # Of what goes on outside the picture less is known than the network says.
+        np.testing.assert_allclose(sigmas[1] / sides[1], 2.0 * sigmas[0] / sides[0], rtol=0.03)
     none_px, _ = network.points(image, boxes_px[:0], np.zeros(0, dtype=np.int64))
     assert none_px.shape == (0, 2)
 

@@ -11,7 +11,7 @@ import numpy as np
 from standoff.core.boxes import unknown_points
 from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.errors import ModelError
-from standoff.core.homography import FloatArray
+from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import ImageArray, IntArray
 from standoff.stages.detect.params import Provider
 from standoff.stages.detect.point_crops import POINT_CLASSES, crop, squares_px
@@ -22,6 +22,11 @@ FORMAT: Final = "1"
 CROPS_INPUT: Final = "crops"
 CLASS_INPUT: Final = "class_index"
 POINTS_OUTPUT: Final = "points"
+
+_CUT_OFF_TIMES: Final = 2.0
+"""How much larger the errors are of what goes on outside the picture than the network says: 1.9 times where rendered
+scenes of the split `val` have 38 such boxes."""
+_EDGE_PX: Final = 2.0
 
 _INDEX_OF_CLASS = np.full(len(CLASS_BY_NAME), -1)
 for _name in POINT_CLASSES:
@@ -82,5 +87,14 @@ class PointNetwork:
             found = told_by_runtime(error)
             raise ModelError(expected=f"{self._name} to run", found=found, fix="copy the file again") from error
         points[rows] = squares[:, :2] + told[:, :2] * squares[:, 2:] - 0.5
-        sigma[rows] = told[:, 2:] * squares[:, 2:]
+        unseen = np.where(_cut_off(xyxy_px[rows], image.shape[:2]), _CUT_OFF_TIMES, 1.0)
+        sigma[rows] = told[:, 2:] * squares[:, 2:] * unseen[:, None]
         return points, sigma
+
+
+def _cut_off(xyxy_px: FloatArray, shape: tuple[int, ...]) -> BoolArray:
+    """Tell (N,) which boxes reach the edge of a picture of this (height, width)."""
+    low = xyxy_px[:, :2] < _EDGE_PX - 0.5
+    high = xyxy_px[:, 2:] > np.array(shape[::-1]) - 0.5 - _EDGE_PX
+    cut_off: BoolArray = (low | high).any(axis=1)
+    return cut_off
