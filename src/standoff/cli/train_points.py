@@ -20,6 +20,13 @@ def train_points(
         ),
     ],
     out: Annotated[Path, typer.Option("--out", "-o", help="ONNX file to write.", show_default=False)],
+    only: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Class of which the network is to be asked; may be repeated. Of the others their usual place in a box "
+            "counts, which may be as good. [default: all]"
+        ),
+    ] = None,
     steps: Annotated[int, typer.Option(min=1, help="Batches of 64 boxes.")] = 7000,
     seed: Annotated[int, typer.Option(min=0, help="Of everything random.")] = 0,
     workers: Annotated[int, typer.Option(min=0, help="Processes that draw boxes; 0: none beside.")] = 1,
@@ -30,9 +37,16 @@ def train_points(
 
     require_packages("torch", "onnx", purpose="train ground points")
     from standoff.cli.console import print_table, progress
+    from standoff.core.errors import ConfigError
     from standoff.labels import read_data
+    from standoff.stages.detect.point_crops import POINT_CLASSES
     from standoff.training.ground_point import PointTraining, measure_points, read_patches, train_points, write_points
 
+    unknown = sorted(set(only or ()) - set(POINT_CLASSES))
+    if unknown:
+        raise ConfigError(
+            expected=f"--only with one of {', '.join(POINT_CLASSES)}", found=", ".join(unknown), fix="correct the name"
+        )
     labelled = read_data(data)
     learn, hold = (labelled.splits[split] for split in ("train", "val"))
     with progress("reading", len(learn) + len(hold), quiet=quiet, unit="pictures") as on_picture:
@@ -41,7 +55,7 @@ def train_points(
     with progress(f"training on {len(patches)} boxes", steps, quiet=quiet, unit="steps") as on_step:
         network = train_points(patches, plan, on_step)
     errors = measure_points(network, held)
-    write_points(network, errors, out, {"boxes": len(patches), "steps": steps, "seed": seed})
+    write_points(network, errors, out, {"boxes": len(patches), "steps": steps, "seed": seed}, only or ())
     title = f"Ground points of {len(held)} boxes that were not learnt from"
     caption = "Distance from the true point in longer sides of the box; how many lie in the ellipse of 95 %, and by "
     caption += "what the stated errors are multiplied in the file so that 95 of 100 do."

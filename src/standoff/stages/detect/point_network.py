@@ -19,6 +19,8 @@ from standoff.stages.detect.runtime import ONNX_ERRORS, open_session, told_by_ru
 
 FORMAT_KEY: Final = "standoff_ground_points"
 FORMAT: Final = "1"
+TELLS_KEY: Final = "tells"
+"""In the metadata: the classes of which the network is asked; left out or empty: all that it has learnt."""
 CROPS_INPUT: Final = "crops"
 CLASS_INPUT: Final = "class_index"
 POINTS_OUTPUT: Final = "points"
@@ -27,10 +29,6 @@ _CUT_OFF_TIMES: Final = 2.0
 """How much larger the errors are of what goes on outside the picture than the network says: 1.9 times where rendered
 scenes of the split `val` have 38 such boxes."""
 _EDGE_PX: Final = 2.0
-
-_INDEX_OF_CLASS = np.full(len(CLASS_BY_NAME), -1)
-for _name in POINT_CLASSES:
-    _INDEX_OF_CLASS[CLASS_BY_NAME[_name].id] = POINT_CLASSES.index(_name)
 
 
 class PointNetwork:
@@ -56,6 +54,9 @@ class PointNetwork:
                 found="another one" if FORMAT_KEY not in texts else "one of another version of standoff",
                 fix="make it with `standoff train-points`, or leave detect.ground_points out",
             )
+        self._index_of_class = np.full(len(CLASS_BY_NAME), -1)
+        for name in json.loads(texts.get(TELLS_KEY, "[]")) or POINT_CLASSES:
+            self._index_of_class[CLASS_BY_NAME[name].id] = POINT_CLASSES.index(name)
 
     def points(self, image: ImageArray, xyxy_px: FloatArray, class_id: IntArray) -> tuple[FloatArray, FloatArray]:
         """Say where things stand.
@@ -72,14 +73,14 @@ class PointNetwork:
             ModelError: The network cannot be run.
         """
         points, sigma = unknown_points(len(class_id)), unknown_points(len(class_id))
-        rows = np.flatnonzero(_INDEX_OF_CLASS[class_id] >= 0)
+        rows = np.flatnonzero(self._index_of_class[class_id] >= 0)
         if not len(rows):
             return points, sigma
         squares = squares_px(xyxy_px[rows])
         crops = np.stack([crop(image, square) for square in squares])[..., ::-1]
         feed = {
             CROPS_INPUT: np.ascontiguousarray(crops.transpose(0, 3, 1, 2), dtype=np.float32) / np.float32(255.0),
-            CLASS_INPUT: _INDEX_OF_CLASS[class_id[rows]],
+            CLASS_INPUT: self._index_of_class[class_id[rows]],
         }
         try:
             told = np.asarray(self._session.run([POINTS_OUTPUT], feed)[0], dtype=np.float64)
@@ -96,5 +97,4 @@ def _cut_off(xyxy_px: FloatArray, shape: tuple[int, ...]) -> BoolArray:
     """Tell (N,) which boxes reach the edge of a picture of this (height, width)."""
     low = xyxy_px[:, :2] < _EDGE_PX - 0.5
     high = xyxy_px[:, 2:] > np.array(shape[::-1]) - 0.5 - _EDGE_PX
-    cut_off: BoolArray = (low | high).any(axis=1)
-    return cut_off
+    return np.asarray((low | high).any(axis=1))

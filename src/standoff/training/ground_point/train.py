@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -22,7 +22,14 @@ from standoff.core.homography import FloatArray
 from standoff.core.types import IntArray
 from standoff.files.whole import whole_file
 from standoff.stages.detect.point_crops import AROUND, CROP_PX, POINT_CLASSES
-from standoff.stages.detect.point_network import CLASS_INPUT, CROPS_INPUT, FORMAT, FORMAT_KEY, POINTS_OUTPUT
+from standoff.stages.detect.point_network import (
+    CLASS_INPUT,
+    CROPS_INPUT,
+    FORMAT,
+    FORMAT_KEY,
+    POINTS_OUTPUT,
+    TELLS_KEY,
+)
 from standoff.training.darknet.export import OPSET
 from standoff.training.ground_point.crops import PATCH_PX, Patches, drawn_crop, middle_crop
 from standoff.training.ground_point.network import LOG_SIGMA, GroundPointNetwork, ToldPoints
@@ -211,7 +218,13 @@ def _all_told(network: GroundPointNetwork, patches: Patches) -> FloatArray:
     return np.concatenate([np.zeros((0, 4)), *parts]).astype(np.float64)
 
 
-def write_points(network: GroundPointNetwork, errors: list[PointError], out: Path, facts: dict[str, object]) -> None:
+def write_points(
+    network: GroundPointNetwork,
+    errors: list[PointError],
+    out: Path,
+    facts: dict[str, object],
+    tells: Sequence[str] = (),
+) -> None:
     """Write the ONNX file; it appears only when complete.
 
     Args:
@@ -219,6 +232,7 @@ def write_points(network: GroundPointNetwork, errors: list[PointError], out: Pat
         errors: On what it did not learn from: its standard errors are stretched by them.
         out: The file.
         facts: What else its metadata say.
+        tells: Classes of which it will be asked; empty: all.
 
     Raises:
         OutputError: The file cannot be written.
@@ -240,6 +254,6 @@ def write_points(network: GroundPointNetwork, errors: list[PointError], out: Pat
                 dynamic_axes={name: {0: "count"} for name in (CROPS_INPUT, CLASS_INPUT, POINTS_OUTPUT)},
             )
         model = onnx.load(str(path))
-        texts = {FORMAT_KEY: FORMAT, "classes": json.dumps(POINT_CLASSES)}
+        texts = {FORMAT_KEY: FORMAT, "classes": json.dumps(POINT_CLASSES), TELLS_KEY: json.dumps(list(tells))}
         onnx.helper.set_model_props(model, texts | {key: json.dumps(value) for key, value in facts.items()})
         onnx.save(model, str(path))
