@@ -70,7 +70,7 @@ def test_a_network_that_gives_no_point_for_a_box_leaves_it_unknown(tmp_path: Pat
     rows = _rows(np.random.default_rng(0), 3)
     points = np.full((1, 3, 4), np.nan, np.float32)
     points[0, 1] = 3.0, 4.0, 1.0, 1.0
-    found = OnnxDetector(_save(tmp_path / "a.onnx", rows, points)).detect(
+    found = OnnxDetector(_save(tmp_path / "a.onnx", rows, points), DetectParams(ground_points="none")).detect(
         frame_from_array(np.zeros((32, 64, 3), np.uint8))
     )
     assert np.isfinite(found.foot_px).all(axis=1).sum() == 1
