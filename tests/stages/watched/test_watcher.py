@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+import re
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -199,3 +202,21 @@ def test_a_picture_is_judged_anew_after_a_while() -> None:
         for time_s, picture in ((0.0, site_picture(0)), (0.2, foggy), (0.4, foggy), (0.5, foggy))
     ]
     assert shares == [1.0, 1.0, 1.0, 0.0]
+
+
+def test_what_would_make_ground_watched_is_said_of_what_was_measured() -> None:
+    measured = replace(FINDING, measured=True)
+    for finding, altitude_m, words in (
+        (measured, 12.0, None),
+        (measured, 110.0, r"about 1\d px tall .* 90% .* from 20 px"),
+        (FINDING, 110.0, "nobody measured"),
+    ):
+        watcher = GroundWatcher(finding=finding)
+        for time_s in (0.0, 1.0):
+            watcher.update(frame(site_picture(0), time_s), ground_map(altitude_m), *nobody())
+        said = list(watcher.description["warnings"])
+        assert len(said) == (words is not None) and all(re.search(str(words), one) for one in said)
+        # A stream that had no map for most of the time has another trouble.
+        for time_s in range(2, 9):
+            watcher.update(frame(site_picture(0), float(time_s)), NoGroundMap("not found"), *nobody())
+        assert [one for one in watcher.description["warnings"] if "most ground" in one] == []

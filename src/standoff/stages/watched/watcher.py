@@ -87,14 +87,14 @@ class GroundWatcher:
         }
 
     def _warnings(self) -> list[str]:
-        """Return that the heights are a guess, and what would make ground watched that is not."""
-        guessed = [] if self._finding.measured else [_GUESSED]
+        """Return that the heights are a guess, or what would make ground watched that is not."""
+        if not self._finding.measured:
+            return [_GUESSED]
         if 2 * self._judged_small <= self._looks:
-            return guessed
+            return []
         usual_px, share = self._usual_px / self._judged, self._params.found_share
         least_px = self._finding.least_height_px(share)
         return [
-            *guessed,
             f"most ground is not watched: a worker there is about {usual_px:.0f} px tall in the detector's input, and "
             f"{share:.0%} of them are found from {least_px:.0f} px on: fly lower, zoom in, or set detect.slices",
         ]
