@@ -208,7 +208,7 @@ def test_what_would_make_ground_watched_is_said_of_what_was_measured() -> None:
     measured = replace(FINDING, measured=True)
     for finding, altitude_m, words in (
         (measured, 12.0, None),
-        (measured, 110.0, r"about 1\d px tall .* 90% .* from 20 px"),
+        (measured, 110.0, r"about 1\d px tall .* 90 % .* from 20 px"),
         (FINDING, 110.0, "nobody measured"),
     ):
         watcher = GroundWatcher(finding=finding)
