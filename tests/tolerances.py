@@ -216,3 +216,10 @@ NOISE_REL = 0.05
 
 STANDING_REL = 0.06
 """A person seen in parallel against true perspective, from 12 m and more: his head is that much nearer."""
+
+POOLED_COVERAGE = {"inside_95": 0.90, "inside_68": 0.60}
+"""Shares of distances inside their stated intervals, four clips pooled. Of 36 clips, 0.985 and 0.76; of four drawn from
+them, 0.95 and 0.60 at the 2.5th percentile. Errors stated half as large get 0.876 and 0.59 at the 97.5th."""
+
+COVERAGE_OF_A_KIND = 0.85
+"""Of the 95 % intervals of one kind of pair over some thirty clips, a dozen of which show it at all."""

@@ -96,7 +96,8 @@ class GroundWatcher:
         least_px = self._finding.least_height_px(share)
         return [
             f"most ground is not watched: a worker there is about {usual_px:.0f} px tall in the detector's input, and "
-            f"{100.0 * share:.0f} % of them are found from {least_px:.0f} px on: fly lower, zoom in, or set detect.slices",
+            f"{100.0 * share:.0f} % of them are found from {least_px:.0f} px on: fly lower, zoom in, or set "
+            "detect.slices"
         ]
 
     def update(
