@@ -7,22 +7,12 @@ from typing import Annotated
 
 import typer
 
-from standoff.cli.numbers import pairs_of_folders
+from standoff.cli.runs_and_clips import JsonFile, RunsAndClips, pairs_of_folders
 
 
 def coverage(
-    folders: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="RUN CLIP",
-            help="Folder of a run with its tables, and of the clip of `standoff simulate` that it is of; several pairs "
-            "of them are pooled.",
-            show_default=False,
-        ),
-    ],
-    json_file: Annotated[
-        Path | None, typer.Option("--json", help="Also write the result as JSON; - prints only that.")
-    ] = None,
+    folders: RunsAndClips,
+    json_file: JsonFile = None,
     markdown: Annotated[bool, typer.Option("--markdown", help="Print the tables in Markdown.")] = False,
     report: Annotated[
         Path | None, typer.Option(help="Also write one HTML page with tables and a reliability plot.")

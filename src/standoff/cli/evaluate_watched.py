@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from standoff.cli.numbers import pairs_of_folders
+from standoff.cli.runs_and_clips import JsonFile, RunsAndClips, pairs_of_folders
 
 if TYPE_CHECKING:
     from standoff.cli.console import Table
@@ -15,18 +15,8 @@ if TYPE_CHECKING:
 
 
 def watched(
-    folders: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="RUN CLIP",
-            help="Folder of a run with its tables, and of the clip of `standoff simulate` that it is of; several pairs "
-            "of them are pooled.",
-            show_default=False,
-        ),
-    ],
-    json_file: Annotated[
-        Path | None, typer.Option("--json", help="Also write the result as JSON; - prints only that.")
-    ] = None,
+    folders: RunsAndClips,
+    json_file: JsonFile = None,
     write_finding: Annotated[
         Path | None,
         typer.Option(help="Write into this model's file, which all runs must have used, how small a worker it finds."),

@@ -1,9 +1,6 @@
-"""Two whole numbers with a sign between them, ranges of frames, and pairs of folders, as several verbs take them."""
+"""Two whole numbers with a sign between them, as several options take them, and ranges of frames."""
 
 from __future__ import annotations
-
-from collections.abc import Sequence
-from pathlib import Path
 
 from standoff.core.errors import ConfigError
 
@@ -45,18 +42,3 @@ def frame_range(text: str | None) -> tuple[int, int] | None:
     if not 0 < first <= last:
         raise ConfigError(expected=expected, found=repr(text), fix=f"write for example {example}")
     return first, last
-
-
-def pairs_of_folders(folders: Sequence[Path]) -> list[tuple[Path, Path]]:
-    """Return each run's folder with that of its clip.
-
-    Raises:
-        ConfigError: One has no other.
-    """
-    if len(folders) % 2:
-        raise ConfigError(
-            expected="pairs of folders, RUN CLIP RUN CLIP ...",
-            found=f"{len(folders)} folder{'s' * (len(folders) > 1)}",
-            fix="name the clip after each run",
-        )
-    return list(zip(folders[::2], folders[1::2], strict=True))

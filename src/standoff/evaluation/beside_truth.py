@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -35,6 +35,9 @@ _WHOLE_SHARE = 0.9
 _BEYOND_EDGE_PX = 1.0
 _SAME_TIME_S = 0.005
 """Presentation times are whole ticks of a clock; frames are at least three times as far apart."""
+
+
+_Samples = TypeVar("_Samples")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,6 +97,24 @@ def read_beside_truth(
     truth, tracks = _shown(truth, frames), _read_tracks(run)
     track_row, *ends = _match(truth, tracks)
     return BesideTruth(record, size_px, frames, truth, tracks, track_row, (ends[0], ends[1]))
+
+
+def read_each(
+    runs: Sequence[tuple[Path, Path]], read: Callable[[Path, Path], _Samples], on_run: Callable[[], None] | None
+) -> list[_Samples]:
+    """Read what is scored of several runs.
+
+    Args:
+        runs: Folder of each run and of its clip.
+        read: Reads one.
+        on_run: Called after each.
+    """
+    samples = []
+    for run, clip in runs:
+        samples.append(read(run, clip))
+        if on_run is not None:
+            on_run()
+    return samples
 
 
 def _read_record(run: Path) -> Mapping[str, Any]:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from standoff.evaluation.beside_truth import read_each
 from standoff.evaluation.coverage.samples import ClipSamples, PairSamples, PositionSamples, read_samples
 from standoff.evaluation.coverage.score import CoverageResult, PairRow, PositionRow, score_samples
 
@@ -37,9 +38,4 @@ def evaluate_coverage(runs: Sequence[tuple[Path, Path]], on_run: Callable[[], No
     Raises:
         DataError: A file is missing or not what it should be, or a run is not one of its clip.
     """
-    samples = []
-    for run, clip in runs:
-        samples.append(read_samples(run, clip))
-        if on_run is not None:
-            on_run()
-    return score_samples(samples)
+    return score_samples(read_each(runs, read_samples, on_run))

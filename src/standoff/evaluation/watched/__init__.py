@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from standoff.evaluation.beside_truth import read_each
 from standoff.evaluation.watched.samples import WorkerSamples, read_worker_samples
 from standoff.evaluation.watched.score import Missed, WatchedResult, score_watched
 
@@ -27,9 +28,4 @@ def evaluate_watched(runs: Sequence[tuple[Path, Path]], on_run: Callable[[], Non
     Raises:
         DataError: A file is missing or not what it should be, or a run is not one of its clip.
     """
-    samples = []
-    for run, clip in runs:
-        samples.append(read_worker_samples(run, clip))
-        if on_run is not None:
-            on_run()
-    return score_watched(samples)
+    return score_watched(read_each(runs, read_worker_samples, on_run))
