@@ -54,3 +54,10 @@ def test_enough_watched_ground_and_frames_that_nobody_judged_say_nothing() -> No
 def test_a_missing_map_is_told_once_not_twice() -> None:
     events = events_of([(NoGroundMap("reference not found"), ground(0.0))] * 10)
     assert [event.reason for event in events if event.phase == "opened"] == ["reference not found"]
+
+
+def test_a_share_about_the_limit_does_not_flicker() -> None:
+    shares = [0.04] * 10 + [0.06, 0.04, 0.07] * 20
+    events = events_of([(GROUND, ground(share)) for share in shares])
+    assert [event.phase for event in events] == ["opened", "closed"]
+    assert events[-1].reason == "end of stream"

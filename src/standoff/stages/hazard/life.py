@@ -147,6 +147,11 @@ class StreamHazard:
         self._rule = rule
         self._hazard: OpenHazard | None = None
 
+    @property
+    def is_open(self) -> bool:
+        """Whether it has begun and not ended."""
+        return self._hazard is not None
+
     def begin(self, time_s: float, reason: str) -> Hazard:
         """Open the hazard."""
         self._hazard = OpenHazard(self._rule, (), "unknown")

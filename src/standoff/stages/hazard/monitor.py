@@ -117,7 +117,9 @@ class HazardMonitor:
 
     def _unseeing(self, watched: WatchedGround) -> str:
         """Return why a worker would hardly be found anywhere; "" where there is ground enough that is watched."""
-        if not watched.judged or watched.share >= self._params.least_watched_share:
+        # What was too little is enough again only at twice as much: a share near the limit does not flicker.
+        enough = (2.0 if self._sight.is_open else 1.0) * self._params.least_watched_share
+        if not watched.judged or watched.share >= enough:
             return ""
         return ": ".join([NOTHING_WATCHED, *list(watched.unwatched)[:1]])
 

@@ -71,7 +71,10 @@ class HazardParams:
     least_watched_share: Annotated[
         float,
         Interval(ge=0, le=1),
-        Doc("Where less than this share of the ground in the picture is watched, that is said: silence is no safety."),
+        Doc(
+            "Where less than this share of the ground in the picture is watched, that is said, until it is twice as "
+            "much: silence is no safety."
+        ),
     ] = 0.05
     update_every_s: Annotated[
         float, Ge(0), Doc("While a hazard lasts it is reported again every so many seconds, and at every change.")
