@@ -18,7 +18,7 @@ SHARED ?= ../shared/data
 YOLO := $(SHARED)/weights/yolo-fastest-1.1-xl/yolo-fastest-1.1-xl
 WORKERS ?= 2
 # The packages that run on site, and the tests that are theirs.
-COUNTED := tests/core tests/files tests/stages tests/test_pipeline.py src/standoff/core src/standoff/files src/standoff/stages
+COUNTED := tests/core tests/files tests/stages tests/monitor src/standoff/core src/standoff/files src/standoff/stages src/standoff/monitor
 
 DEMO_VENV := .venv-demo
 SOURCES := $(shell find src -type f -not -path '*/__pycache__/*')

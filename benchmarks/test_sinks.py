@@ -12,10 +12,11 @@ import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 from stages.sinks.fake_site import FakeSite
 
-from standoff.core.types import FrameResult, ImageArray, Outcome, Sink
-from standoff.stages.sinks import FRAMES, PROXIMITY, TRACKS, Composer, HazardSink, RecordSink, ReportSink, TableSink
+from standoff.core.protocols import Sink
+from standoff.core.types import FrameResult, ImageArray, Outcome
+from standoff.stages.sinks import FRAMES, PROXIMITY, TRACKS, Composer, HazardSink, ReportSink, TableSink
 from standoff.stages.sinks.encoder import VideoFile
-from standoff.stages.sinks.scene import OpenHazards, Scene
+from standoff.stages.sinks.scene import Scene
 
 SIZE = (1920, 1080)
 _Item = TypeVar("_Item")
@@ -36,12 +37,10 @@ def _each(items: list[_Item], action: Callable[[_Item], object]) -> Callable[[],
 
 
 def _composing(composer: Composer, results: list[FrameResult]) -> Callable[[], None]:
-    hazards = OpenHazards()
     scenes: list[tuple[ImageArray, Scene]] = []
     for result in results:
-        hazards.update(result.hazards)
         picture = result.frame.picture.resized_bgr(*composer.picture_size_px)
-        scenes.append((picture, Scene.of(result, hazards)))
+        scenes.append((picture, Scene.of(result)))
     return _each(scenes, lambda item: composer.compose(*item))
 
 
@@ -61,9 +60,7 @@ def test_baseline_encoding_the_composed_picture(
     benchmark: BenchmarkFixture, tmp_path: Path, results: list[FrameResult]
 ) -> None:
     composer, time_s = Composer(SIZE), itertools.count(0.0, 0.04)
-    picture = composer.compose(
-        results[0].frame.picture.resized_bgr(*composer.picture_size_px), Scene.of(results[0], OpenHazards())
-    )
+    picture = composer.compose(results[0].frame.picture.resized_bgr(*composer.picture_size_px), Scene.of(results[0]))
     file = VideoFile(tmp_path / "annotated.mp4", composer.size_px, crf=23, preset="superfast")
     benchmark(lambda: file.write(picture, next(time_s)))
     file.close()
@@ -76,7 +73,6 @@ def test_all_other_outputs(benchmark: BenchmarkFixture, tmp_path: Path, results:
         TableSink(tmp_path / "frames.parquet", FRAMES),
         HazardSink(tmp_path / "hazards.jsonl"),
         ReportSink(tmp_path / "report.html"),
-        RecordSink(tmp_path / "run.json", {}),
     ]
 
     def write(result: FrameResult) -> None:

@@ -10,14 +10,16 @@ from hypothesis import strategies as st
 from laws import examples
 from mutations import mutated
 
-from standoff.config import Settings, build_ground, build_pipeline, build_stage, load_settings, resolved
+from standoff.config import Settings, build_ground, build_stage, load_settings, resolved
+from standoff.core import protocols
 from standoff.core.errors import ConfigError, GroundError
 from standoff.core.types import Detections, Frame
+from standoff.monitor import build_monitor
 from standoff.stages.ground import FusedGround, ScaleWatch, Unmapped
 from standoff.stages.hazard import HazardMonitor
 
 
-class Blind:
+class Blind(protocols.Detector):
     """A detector that sees nothing, to stand in for a model."""
 
     def __init__(self, patience: int = 0) -> None:
@@ -52,34 +54,39 @@ def test_paths_in_a_settings_file_are_relative_to_the_file(tmp_path: Path) -> No
 
 
 def test_telemetry_is_a_file_beside_the_settings_or_none(tmp_path: Path) -> None:
-    assert load_settings(write(tmp_path, "telemetry: flight.srt\n")).telemetry == tmp_path / "flight.srt"
-    assert load_settings(write(tmp_path, "telemetry: none\n")).telemetry == "none"
-    assert load_settings(None, {"telemetry": "none"}).telemetry == "none"
-    assert load_settings().telemetry is None
+    assert (
+        load_settings(write(tmp_path, "source: {telemetry: flight.srt}\n")).source.telemetry == tmp_path / "flight.srt"
+    )
+    assert load_settings(write(tmp_path, "source: {telemetry: none}\n")).source.telemetry == "none"
+    assert load_settings(None, {"source": {"telemetry": "none"}}).source.telemetry == "none"
+    assert load_settings().source.telemetry is None
 
 
 def test_the_command_line_wins_over_the_environment_and_that_over_the_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path = write(tmp_path, "every: 2\ndetect_every: 2\ntrack: {max_coast_s: 3.0, max_lost_s: 3.0, confirm_hits: 5}\n")
+    path = write(
+        tmp_path, "source: {every: 2}\ndetect_every: 2\ntrack: {max_coast_s: 3.0, max_lost_s: 3.0, confirm_hits: 5}\n"
+    )
     monkeypatch.setenv("STANDOFF_DETECT_EVERY", "4")
-    monkeypatch.setenv("STANDOFF_EVERY", "4")
+    monkeypatch.setenv("STANDOFF_SOURCE__EVERY", "4")
     monkeypatch.setenv("STANDOFF_TRACK__MAX_COAST_S", "2.5")
-    settings = load_settings(path, {"every": 6})
-    assert (settings.every, settings.detect_every) == (6, 4)
+    settings = load_settings(path, {"source": {"every": 6}})
+    assert (settings.source.every, settings.detect_every) == (6, 4)
     assert (settings.track.max_coast_s, settings.track.confirm_hits) == (2.5, 5)
 
 
 @pytest.mark.parametrize(
     ("text", "telling"),
     [
-        ("evry: 2\n", "did you mean every?"),
+        ("detect_evry: 2\n", "did you mean detect_every?"),
+        ("every: 2\n", "did you mean source.every?"),
         ("track: {max_cost_s: 2}\n", "did you mean max_coast_s?"),
         ("video: {draw: {circle: false}}\n", "video.draw has no setting 'circle'; did you mean circles?"),
         ("track: {high_score: 1.5}\n", "less than or equal to 1"),
-        ("every: true\n", "every: true where a number should be"),
+        ("detect_every: true\n", "detect_every: true where a number should be"),
         ("ground: {reference: {square_m: 2, box_px: [true, 2, 30, 40]}}\n", "ground.reference.box_px: true where"),
-        ("every: 0\n", "greater than or equal to 1"),
+        ("detect_every: 0\n", "greater than or equal to 1"),
         ("outputs: [video, film]\n", "film"),
         ("locate: {radius_m: {digger: 3}}\n", "no class is called digger"),
         ("ground: {reference: {}}\n", "give one of square_m"),
@@ -123,16 +130,16 @@ def test_every_stage_can_be_replaced_by_name(tmp_path: Path) -> None:
       detect: {factory: "test_config:Blind", options: {patience: 7}}
       hazard: {factory: "standoff.stages.hazard:HazardMonitor"}
     """
-    pipeline = build_pipeline(load_settings(write(tmp_path, text)), frames=())
-    assert getattr(pipeline.detector, "patience", None) == 7
-    assert isinstance(pipeline.hazard, HazardMonitor)
+    monitor = build_monitor(load_settings(write(tmp_path, text)))
+    assert getattr(monitor.detector, "patience", None) == 7
+    assert isinstance(monitor.hazard, HazardMonitor)
 
 
 @pytest.mark.parametrize("factory", ["no_such_module:Thing", "test_config:NoSuchThing"])
 def test_a_replacement_that_is_not_there_is_one_line(factory: str) -> None:
     settings = load_settings(overrides={"replace": {"detect": {"factory": factory}}})
     with pytest.raises(ConfigError, match="to be importable"):
-        build_pipeline(settings, frames=())
+        build_monitor(settings)
 
 
 def test_a_replacement_that_does_not_take_its_options_is_one_line() -> None:
@@ -140,7 +147,7 @@ def test_a_replacement_that_does_not_take_its_options_is_one_line() -> None:
         overrides={"replace": {"detect": {"factory": "test_config:Blind", "options": {"mood": 1}}}}
     )
     with pytest.raises(ConfigError, match="mood"):
-        build_pipeline(settings, frames=())
+        build_monitor(settings)
 
 
 @pytest.mark.parametrize(
@@ -233,16 +240,16 @@ def people_only(**more: object) -> Settings:
 
 def test_a_model_that_can_never_see_one_side_of_a_pair_is_refused() -> None:
     with pytest.raises(ConfigError, match="without any equipment"):
-        build_pipeline(people_only(), frames=())
-    build_pipeline(people_only(proximity={"pairs": [["person", "person"]]}), frames=())
+        build_monitor(people_only())
+    build_monitor(people_only(proximity={"pairs": [["person", "person"]]}))
 
 
 def test_a_reference_without_a_box_needs_a_model_that_knows_it() -> None:
     pairs = {"pairs": [["person", "person"]]}
     with pytest.raises(ConfigError, match="neither a box nor a model"):
-        build_pipeline(people_only(proximity=pairs, ground={"reference": {"square_m": 2.0}}), frames=())
+        build_monitor(people_only(proximity=pairs, ground={"reference": {"square_m": 2.0}}))
     boxed = {"reference": {"square_m": 2.0, "box_px": [1, 2, 30, 40]}}
-    build_pipeline(people_only(proximity=pairs, ground=boxed), frames=())
+    build_monitor(people_only(proximity=pairs, ground=boxed))
 
 
 @pytest.mark.parametrize(
@@ -252,9 +259,9 @@ def test_a_reference_without_a_box_needs_a_model_that_knows_it() -> None:
         ("STANDOFF_TRAK__MAX_COAST_S", "STANDOFF_TRACK__MAX_COAST_S"),
         ("STANDOFF_MODELL", "STANDOFF_MODEL"),
         ("standoff_modell", "STANDOFF_MODEL"),
-        ("STANDOF_EVERY", "STANDOFF_EVERY"),
-        ("STANDOFFEVERY", "STANDOFF_EVERY"),
-        ("StandOff_Evry", "STANDOFF_EVERY"),
+        ("STANDOF_SOURCE__EVERY", "STANDOFF_SOURCE__EVERY"),
+        ("STANDOFFMODEL", "STANDOFF_MODEL"),
+        ("StandOff_Modl", "STANDOFF_MODEL"),
         ("STANDOFF_DETECTEVERY", "STANDOFF_DETECT_EVERY"),
         ("STANDOFF_TRACK_MAX_COAST_S", "STANDOFF_TRACK__MAX_COAST_S"),
         ("STNADOFF_TRACK__MAX_COAST_S", "STANDOFF_TRACK__MAX_COAST_S"),
@@ -282,18 +289,18 @@ def test_a_variable_that_is_like_no_setting_is_refused_without_a_guess(monkeypat
 )
 def test_variables_of_other_programs_are_theirs(monkeypatch: pytest.MonkeyPatch, variable: str) -> None:
     monkeypatch.setenv(variable, "4")
-    assert load_settings().every == 1
+    assert load_settings().source.every == 1
 
 
-@pytest.mark.parametrize("variable", ["standoff_every", "STANDOFF_EVERY"])
+@pytest.mark.parametrize("variable", ["standoff_source__every", "STANDOFF_SOURCE__EVERY"])
 def test_variables_are_read_in_any_case(monkeypatch: pytest.MonkeyPatch, variable: str) -> None:
     monkeypatch.setenv(variable, "4")
-    assert load_settings().every == 4
+    assert load_settings().source.every == 4
 
 
 def test_a_settings_file_with_a_name_twice_is_refused_with_both_lines(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match=r"line 3: the key `every` a second time, after line 1"):
-        load_settings(write(tmp_path, "every: 2\nmodel: site\nevery: 3\n"))
+    with pytest.raises(ConfigError, match=r"line 3: the key `detect_every` a second time, after line 1"):
+        load_settings(write(tmp_path, "detect_every: 2\nmodel: site\ndetect_every: 3\n"))
 
 
 def test_numbers_in_a_settings_file_are_what_they_say_or_refused(tmp_path: Path) -> None:
@@ -304,14 +311,14 @@ def test_numbers_in_a_settings_file_are_what_they_say_or_refused(tmp_path: Path)
 
 def test_a_settings_file_of_another_editor_is_read_or_its_encoding_named(tmp_path: Path) -> None:
     path = tmp_path / "site.yaml"
-    path.write_bytes(b"\xef\xbb\xbfevery: 2\r\n")
-    assert load_settings(path).every == 2
-    path.write_bytes("every: 2\n".encode("utf-16"))
+    path.write_bytes(b"\xef\xbb\xbfdetect_every: 2\r\n")
+    assert load_settings(path).detect_every == 2
+    path.write_bytes("detect_every: 2\n".encode("utf-16"))
     with pytest.raises(ConfigError, match="UTF-16"):
         load_settings(path)
 
 
-_FILE = b"""every: 2
+_FILE = b"""detect_every: 2
 model: site
 ground:
   camera: camera.yaml

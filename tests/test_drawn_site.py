@@ -10,10 +10,11 @@ import pytest
 import tolerances
 from laws import few
 
-from standoff.config import build_pipeline, load_settings
-from standoff.core import homography
+from standoff.config import load_settings
+from standoff.core import homography, protocols
 from standoff.core.homography import FloatArray
 from standoff.core.types import Detections, Frame
+from standoff.monitor import build_monitor
 from standoff.stages.frames import frame_from_array
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "examples" / "drawn_site"))
@@ -22,7 +23,7 @@ import draw_site
 FRAMES = 30
 
 
-class TrueBoxes:
+class TrueBoxes(protocols.Detector):
     """A detector that knows the site."""
 
     def detect(self, frame: Frame) -> Detections:
@@ -62,13 +63,11 @@ def test_distances_through_the_reference_object_are_the_true_ones(
             "replace": {"detect": {"factory": "test_drawn_site:TrueBoxes"}},
         }
     )
-    frames = (
-        frame_from_array(picture, index=index, time_s=index / draw_site.FRAMES_PER_S)
-        for index, picture in enumerate(pictures)
-    )
+    monitor = build_monitor(settings)
     errors_m: list[float] = []
     normalised: list[float] = []
-    for result in build_pipeline(settings, frames).run():
+    for index, picture in enumerate(pictures):
+        result = monitor.step(frame_from_array(picture, index=index, time_s=index / draw_site.FRAMES_PER_S))
         assert result.ground, f"frame {result.frame.index}: {result.ground}"
         feet_m = true_feet_m(result.frame.time_s)
         pairs = result.proximities

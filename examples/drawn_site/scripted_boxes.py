@@ -7,10 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
+from standoff.core.protocols import Detector
 from standoff.core.types import Detections, Frame
 
 
-class ScriptedBoxes:
+class ScriptedBoxes(Detector):
     """Return the boxes that were written down for each frame.
 
     Args:
@@ -18,8 +19,13 @@ class ScriptedBoxes:
     """
 
     def __init__(self, path: str) -> None:
+        self._path = path
         self._frames = json.loads(Path(path).read_text(encoding="utf-8"))
-        self.description = {"kind": "scripted boxes", "path": path}
+
+    @property
+    def description(self) -> dict[str, str]:
+        """What the record of a run says of it."""
+        return {"kind": "scripted boxes", "path": self._path}
 
     def detect(self, frame: Frame) -> Detections:
         """Return this frame's boxes, with full confidence."""

@@ -20,6 +20,7 @@ from cli.calling import Call
 from laws import few
 from pages import PageReader
 
+from standoff.core import protocols
 from standoff.core.errors import GroundError
 from standoff.core.protocols import AnyMotion
 from standoff.core.types import Detections, Frame, NoGroundMap
@@ -34,7 +35,7 @@ FINDS = {"finds_workers": {"height_px": [4.0, 8.0, 16.0], "share": [0.5, 0.95, 0
 """What a detector says of itself that finds workers seen from straight above in a small picture."""
 
 
-class Approach:
+class Approach(protocols.Detector):
     """A detector that sees a worker walk towards an excavator."""
 
     description = FINDS

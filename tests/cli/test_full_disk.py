@@ -15,7 +15,7 @@ from cli.calling import Call
 from cli.test_cli import make_video
 
 from standoff.files.in_use import in_use
-from standoff.stages.sinks import record as record_sink
+from standoff.monitor import run_folder
 
 ROOM_FOR_THE_RECORD = 16_000
 """Bytes a file: no film or report is so short."""
@@ -120,7 +120,7 @@ def test_an_output_that_cannot_be_begun_is_a_failed_run(
     def full(*_words: object) -> None:
         raise FULL
 
-    monkeypatch.setattr("standoff.monitor.build_sinks", full)
+    monkeypatch.setattr("standoff.monitor.open_run.make_sink", full)
     code, out, err = call("run", video, "--config", site, "--out", tmp_path / "out", "--quiet")
     assert (code, out, err.count("\n"), "No space left on device" in err) == (2, "", 1, True)
     assert json.loads((tmp_path / "out" / "run.json").read_text())["status"] == "failed"
@@ -139,5 +139,5 @@ def test_a_run_that_is_going_on_is_not_overwritten(call: Call, video: Path, site
 def test_what_is_written_in_the_place_of_a_longer_record_takes_its_whole_place(tmp_path: Path) -> None:
     path = tmp_path / "run.json"
     path.write_text(json.dumps({"status": "running", "long": "x" * 500}))
-    record_sink._write_over(path, {"status": "failed"})
+    run_folder._write_over(path, {"status": "failed"})
     assert json.loads(path.read_text()) == {"status": "failed"}

@@ -16,6 +16,7 @@ from cli.calling import Call
 from cli.test_cli import FINDS, make_video
 
 from standoff.config import load_settings
+from standoff.core import protocols
 from standoff.core.types import Detections, Frame
 from standoff.monitor import open_run
 
@@ -24,16 +25,16 @@ NOTHING_SEEN = (16, 17, 18)
 """Frames in which the detector finds nothing at all."""
 
 TABLES = ("tracks", "proximity", "frames", "detections")
-SELECTIONS: dict[str, dict[str, float]] = {
+SELECTIONS: dict[str, dict[str, Any]] = {
     "all": {},
-    "every": {"every": 2},
+    "every": {"source": {"every": 2}},
     "detect_every": {"detect_every": 3},
-    "part": {"start_s": 0.55, "stop_s": 3.2},
-    "everything": {"every": 2, "detect_every": 2, "start_s": 0.3, "stop_s": 3.5},
+    "part": {"source": {"start_s": 0.55, "stop_s": 3.2}},
+    "everything": {"detect_every": 2, "source": {"every": 2, "start_s": 0.3, "stop_s": 3.5}},
 }
 
 
-class Unsure:
+class Unsure(protocols.Detector):
     """A detector of two people and an excavator: boxes a little off, now and then one missing or nothing at all."""
 
     description = {"model": "unsure", "class_map": {"man": "worker", "digger": "excavator"}} | FINDS
@@ -48,7 +49,7 @@ class Unsure:
         return found[rng.uniform(size=3) < 0.95]
 
 
-class Forbidden:
+class Forbidden(protocols.Detector):
     """A detector that must never be asked."""
 
     def detect(self, frame: Frame) -> Detections:
@@ -107,7 +108,7 @@ def assert_same(out: Path, expected: Path) -> None:
 
 @pytest.mark.parametrize("selection", SELECTIONS.values(), ids=SELECTIONS.keys())
 def test_a_run_replayed_from_its_own_detections_is_the_same_run(
-    film: Path, recording: Path, tmp_path: Path, selection: dict[str, float]
+    film: Path, recording: Path, tmp_path: Path, selection: dict[str, Any]
 ) -> None:
     original = monitor(film, recording, tmp_path / "original", **selection)
     # How often the detector rested is known from the recording.

@@ -13,13 +13,14 @@ from cli.test_cli import FINDS, make_video
 from files.test_zone_file import collection, feature
 from pages import PageReader
 
+from standoff.core import protocols
 from standoff.core.types import Detections, Frame
 from standoff.files.zone_file import read_zones
 
 RING = [[5.0, 5.0], [8.0, 5.0], [8.0, 7.0], [5.0, 7.0], [5.0, 5.0]]
 
 
-class Walk:
+class Walk(protocols.Detector):
     """A detector that sees a worker walk through the picture at 3 m/s, along y = 5.5 m."""
 
     description = FINDS

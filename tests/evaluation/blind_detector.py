@@ -1,9 +1,10 @@
 from __future__ import annotations
 
+from standoff.core import protocols
 from standoff.core.types import Detections, Frame
 
 
-class BlindDetector:
+class BlindDetector(protocols.Detector):
     """Sees nothing, needs no model."""
 
     def detect(self, frame: Frame) -> Detections:

@@ -16,9 +16,9 @@ from standoff.core.errors import SourceError
 from standoff.core.types import FrameResult, GroundMap
 from standoff.evaluation.bench import bench_source
 from standoff.evaluation.bench_baselines import decoding_baseline, picture_baselines
-from standoff.evaluation.bench_workload import DrawingSink, ScriptedDetector, Site, monitor_workload
+from standoff.evaluation.bench_workload import DrawingSink, ScriptedDetector, Site, SiteFilm, monitor_workload
 from standoff.evaluation.timing import Baseline, Spread, StageTimes, collect_times, machine
-from standoff.pipeline import Pipeline
+from standoff.monitor import Monitor, Run
 from standoff.stages.hazard import HazardMonitor
 from standoff.stages.locate import Locator
 from standoff.stages.motion import MotionEstimator
@@ -29,9 +29,8 @@ from standoff.stages.watched import GroundWatcher
 SMALL_PX = (480, 270)
 
 
-def pipeline(site: Site, kind: Literal["surveyed", "reference"], frames: int = 20) -> Pipeline:
-    return Pipeline(
-        frames=site.frames(frames),
+def run_of(site: Site, kind: Literal["surveyed", "reference"], frames: int = 20) -> Run:
+    monitor = Monitor(
         detector=ScriptedDetector(site),
         motion=MotionEstimator(),
         ground=site.ground(kind),
@@ -40,8 +39,8 @@ def pipeline(site: Site, kind: Literal["surveyed", "reference"], frames: int = 2
         watcher=GroundWatcher(),
         proximity=ProximityMeter(),
         hazard=HazardMonitor(),
-        sinks={"drawing": DrawingSink()},
     )
+    return Run(SiteFilm(site, frames), monitor, {"drawing": DrawingSink()})
 
 
 def test_a_spread_is_what_numpy_says() -> None:
@@ -74,7 +73,7 @@ def test_a_ratio_above_one_means_that_ours_is_faster() -> None:
 
 
 def test_collecting_stops_the_run_and_leaves_the_warm_up_out() -> None:
-    (result,) = pipeline(Site(SMALL_PX, 4), "surveyed", frames=1).run()
+    (result,) = run_of(Site(SMALL_PX, 4), "surveyed", frames=1)
     stopped = []
 
     def endless() -> Iterator[FrameResult]:
@@ -97,7 +96,7 @@ def test_the_made_up_site_is_measured_as_it_is(
     kind: Literal["surveyed", "reference"], size_px: tuple[int, int]
 ) -> None:
     site = Site(size_px, 10)
-    *_, last = pipeline(site, kind).run()
+    *_, last = run_of(site, kind)
     assert isinstance(last.ground, GroundMap)
     moving = last.positions.class_id != 6
     assert moving.sum() == 10

@@ -10,6 +10,7 @@ from evaluation.blind_detector import BlindDetector
 from evaluation.paper import drawn_clip
 
 from standoff.config import Settings, load_settings
+from standoff.core import protocols
 from standoff.core.errors import DataError
 from standoff.core.homography import FloatArray
 from standoff.core.protocols import Detector
@@ -30,7 +31,7 @@ def clip(tmp_path_factory: pytest.TempPathFactory) -> Clip:
     return replace(drawn, box_px=drawn.box_px + 20.0 * np.array([-1.0, -1.0, 1.0, 1.0]))
 
 
-class MovedBoxes:
+class MovedBoxes(protocols.Detector):
     """The true boxes, those of one class so many pixels further right."""
 
     def __init__(self, clip: Clip, class_id: int = 0, right_px: float = 0.0) -> None:

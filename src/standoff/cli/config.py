@@ -80,11 +80,11 @@ def show(
 def check(file: Annotated[Path, typer.Argument(help="Settings, YAML.", show_default=False)]) -> None:
     """Check a settings file and everything that it points to: model, survey, camera, shapes."""
     from standoff.config import STAGE_NAMES, build_stage, import_factory, load_settings
-    from standoff.monitor import stage_warnings
+    from standoff.monitor import warnings_of
 
     settings = load_settings(file)
     for name in STAGE_NAMES:
-        for warning in stage_warnings(build_stage(name, settings)):
+        for warning in warnings_of(build_stage(name, settings)):
             typer.echo(f"standoff: warning: {warning}", err=True)
     for replacement in settings.extra_outputs.values():
         import_factory(replacement)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import closing
 from pathlib import Path
 from time import monotonic
@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from standoff.core.errors import ConfigError, StandoffError
+from standoff.core.outputs import OUTPUTS
 
 if TYPE_CHECKING:
-    from standoff.core.types import FrameResult
+    from standoff.core.types import FrameResult, Severity
     from standoff.monitor import Run
 
 
@@ -69,7 +70,7 @@ def run(
     detect_every: Annotated[int | None, typer.Option(help="Detect on every k-th frame; tracks coast between.")] = None,
     outputs: Annotated[
         str | None,
-        typer.Option(help="What to write, with commas: tracks,proximity,frames,detections,hazards,video,report."),
+        typer.Option(help=f"What to write, with commas: {','.join(OUTPUTS)}."),
     ] = None,
     unit: Annotated[
         str | None, typer.Option(help="metres or feet: what film, report and this console say lengths in.")
@@ -90,13 +91,10 @@ def run(
     from standoff.core.lengths import UNITS
     from standoff.monitor import open_run
 
+    read = {"telemetry": telemetry, "start_s": start, "stop_s": stop, "every": every, "fps": fps}
     plain = {
-        "telemetry": telemetry,
+        "source": {name: value for name, value in read.items() if value is not None} or None,
         "zones": zones,
-        "start_s": start,
-        "stop_s": stop,
-        "every": every,
-        "fps": fps,
         "detect_every": detect_every,
         "outputs": tuple(filter(None, map(str.strip, outputs.split(",")))) if outputs is not None else None,
     }
@@ -173,45 +171,45 @@ def tell(ended: Run, *, as_json: bool, quiet: bool) -> None:
     """Print the record, or a summary of it."""
     from standoff.cli.console import print_table, write_json
     from standoff.core.lengths import UNITS
-    from standoff.stages.sinks import percent_text
+    from standoff.core.watched_shares import percent_text
 
     record = ended.record
     if as_json:
-        write_json(record, Path("-"))
+        write_json(record.to_dict(), Path("-"))
     elif not quiet:
-        counts, hazards = record["counts"], record["counts"]["hazards"]
-        rows = [
-            ("frames", f"{counts['frames']}"),
-            ("frames with a ground map", f"{counts['frames_with_map']}"),
-            ("ground watched", percent_text(record["watched_ground"]["share"])),
-            ("tracks", f"{counts['tracks']}"),
-            ("distances measured", f"{counts['measured_distances']} of {counts['distances']}"),
-            ("hazards", ", ".join(f"{number} {name}" for name, number in hazards.items()) or "none"),
-            *(
-                (f"in {zone}", ", ".join(f"{number} {name}" for name, number in found.items()))
-                for zone, found in counts.get("zones", {}).items()
-            ),
-            ("frames a second", f"{record['frames_per_s']}"),
+        counts, rows = record.counts, record.counts.rows
+        table = [
+            ("frames", f"{rows['frames']}"),
+            ("frames with a ground map", f"{rows['frames_with_map']}"),
+            ("ground watched", percent_text(counts.watched.share)),
+            ("tracks", f"{rows['tracks']}"),
+            ("distances measured", f"{rows['measured_distances']} of {rows['distances']}"),
+            ("hazards", _listed(counts.hazards) or "none"),
+            *((f"in {zone}", _listed(found)) for zone, found in counts.zones.items()),
+            ("frames a second", f"{record.frames_per_s}"),
         ]
-        said = UNITS[record["settings"]["show"]["unit"]].said
-        rows += [(f"no map: {said(reason)}", f"{number}") for reason, number in counts["no_ground_map"].items()]
-        rows += [(f"output {name} failed", message) for name, message in record["sink_errors"].items()]
-        print_table(f"{record['status']}: {ended.folder}", ("", ""), rows, record["message"], texts=2)
+        said = UNITS[record.about["settings"]["show"]["unit"]].said
+        table += [(f"no map: {said(reason)}", f"{number}") for reason, number in counts.no_map.items()]
+        table += [(f"output {name} failed", message) for name, message in record.sink_errors.items()]
+        print_table(f"{record.status}: {record.folder}", ("", ""), table, record.message, texts=2)
+
+
+def _listed(hazards: Mapping[Severity, int]) -> str:
+    return ", ".join(f"{number} {severity}" for severity, number in hazards.items())
 
 
 def exit_status(ended: Run) -> int:
     """Return 1 for a run that was interrupted, did not measure much that it saw, or lost an output."""
     from standoff.core.unfollowed import are_many
 
-    record, lost = ended.record, ended.pipeline.sink_errors
-    if record["status"] == "interrupted":
+    record, rows = ended.record, ended.record.counts.rows
+    if record.status == "interrupted":
         typer.echo("standoff: interrupted; what was written up to then is whole.", err=True)
         return 1
-    unmeasured = record["counts"]["frames_with_map"] == 0
+    unmeasured = rows["frames_with_map"] == 0
     if unmeasured:
         typer.echo("standoff: no frame could be measured; run.json has the reasons.", err=True)
-    counts = record["counts"]
-    untracked = are_many(counts["unfollowed_detections"], counts["sure_detections"])
+    untracked = are_many(rows["unfollowed_detections"], rows["sure_detections"])
     if untracked:
         typer.echo("standoff: many sure detections are in no track; their distances are not known.", err=True)
-    return int(unmeasured or untracked or bool(lost))
+    return int(unmeasured or untracked or bool(ended.sink_errors))

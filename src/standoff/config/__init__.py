@@ -1,4 +1,4 @@
-"""One Settings tree, and the pipeline that it describes.
+"""One Settings tree, and the stages that it describes.
 
 Every stage's own settings are a plain dataclass beside the stage; this package is the only one that knows pydantic,
 which checks their bounds.
@@ -7,7 +7,6 @@ which checks their bounds.
 from standoff.config.build import (
     build_ground,
     build_marker_observer,
-    build_pipeline,
     build_replacement,
     build_stage,
     build_watcher,
@@ -18,7 +17,6 @@ from standoff.config.load import load_settings, read_settings_file, resolved
 from standoff.config.markers import MarkerSettings
 from standoff.config.params import read_params
 from standoff.config.settings import (
-    OUTPUT_NAMES,
     STAGE_NAMES,
     GroundSettings,
     ReferenceSettings,
@@ -27,7 +25,6 @@ from standoff.config.settings import (
 )
 
 __all__ = [
-    "OUTPUT_NAMES",
     "STAGE_NAMES",
     "GroundSettings",
     "MarkerSettings",
@@ -36,7 +33,6 @@ __all__ = [
     "Settings",
     "build_ground",
     "build_marker_observer",
-    "build_pipeline",
     "build_replacement",
     "build_stage",
     "build_watcher",

@@ -1,21 +1,20 @@
-"""Make the stages and the pipeline that the settings describe."""
+"""Make the stages that the settings describe."""
 
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from standoff.config.settings import ReferenceSettings, Replacement, Settings, StageName
+from standoff.core import protocols
 from standoff.core.camera import Camera, CameraPrior
 from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.errors import ConfigError
 from standoff.core.finding import WorkerFinding
-from standoff.core.protocols import CameraMotionEstimator, Detector, Ground
-from standoff.core.types import Frame
+from standoff.core.protocols import CameraMotionEstimator, Detector, Ground, missing_of
 from standoff.core.zones import Zone
 from standoff.files.zone_file import read_zones
-from standoff.pipeline import Pipeline
 from standoff.stages.detect import OnnxDetector, RecordedDetector, find_model
 from standoff.stages.ground import (
     FixedCamera,
@@ -33,7 +32,7 @@ from standoff.stages.ground import (
 from standoff.stages.hazard import HazardMonitor
 from standoff.stages.locate import Locator
 from standoff.stages.motion import MotionEstimator
-from standoff.stages.proximity import ProximityMeter, side_classes
+from standoff.stages.proximity import ProximityMeter
 from standoff.stages.track import Tracker
 from standoff.stages.watched import GroundWatcher
 
@@ -56,21 +55,33 @@ def import_factory(replacement: Replacement) -> Callable[..., Any]:
     return factory
 
 
-def build_replacement(name: str, replacement: Replacement) -> Any:  # noqa: ANN401
+def build_replacement(name: str, replacement: Replacement, contract: type) -> Any:  # noqa: ANN401
     """Make a stage or a sink of the user's own.
 
+    Args:
+        name: What it stands for.
+        replacement: What makes it.
+        contract: What it must be able to do: one of `standoff.core.protocols`.
+
     Raises:
-        ConfigError: It cannot be imported, or does not take the options.
+        ConfigError: It cannot be imported, does not take the options, or makes something that lacks a method.
     """
     factory = import_factory(replacement)
     try:
-        return factory(**replacement.options)
+        made = factory(**replacement.options)
     except (TypeError, ValueError, OSError) as error:
         raise ConfigError(
             expected=f"{replacement.factory} to make {name} of its options",
             found=str(error),
             fix="correct the options",
         ) from error
+    if missing := missing_of(made, contract):
+        raise ConfigError(
+            expected=f"{replacement.factory} to make a {contract.__name__}",
+            found=f"{type(made).__name__} without {', '.join(missing)}",
+            fix=f"derive it from standoff.core.protocols.{contract.__name__}, which has what you need not write",
+        )
+    return made
 
 
 def build_detector(settings: Settings) -> Detector:
@@ -162,7 +173,7 @@ def build_watcher(settings: Settings, detector: Detector) -> GroundWatcher:
     worker = CLASS_BY_NAME["worker"]
     return GroundWatcher(
         settings.watched,
-        WorkerFinding.of_detector(getattr(detector, "description", {})),
+        WorkerFinding.of_detector(detector.description),
         settings.locate.radius_m.get(worker.name, worker.action_radius_m),
     )
 
@@ -202,6 +213,17 @@ def _reference(settings: ReferenceSettings, *, defines_frame: bool) -> Reference
     )
 
 
+_CONTRACTS: Mapping[StageName, type] = {
+    "detect": protocols.Detector,
+    "motion": protocols.CameraMotionEstimator,
+    "ground": protocols.Ground,
+    "track": protocols.Tracker,
+    "locate": protocols.Locator,
+    "watched": protocols.GroundWatcher,
+    "proximity": protocols.ProximityMeter,
+    "hazard": protocols.HazardMonitor,
+}
+
 _MAKERS: Mapping[StageName, Callable[[Settings], Any]] = {
     "detect": build_detector,
     "motion": build_motion,
@@ -228,60 +250,9 @@ def build_stage(
     """
     is_replayed = name == "detect" and settings.detections is not None
     if name in settings.replace and not is_replayed:
-        return build_replacement(name, settings.replace[name])
+        return build_replacement(name, settings.replace[name], _CONTRACTS[name])
     if name == "ground":
         return build_ground(settings, camera)
     if name == "watched":
         return build_watcher(settings, detector or build_stage("detect", settings))
     return _MAKERS[name](settings)
-
-
-def _check_visible(settings: Settings, detector: Detector) -> None:
-    """Raise ConfigError where the model can never show what is to be measured: its silence would read as safety."""
-    class_map = getattr(detector, "description", {}).get("class_map")
-    if class_map is None:
-        return
-    visible = frozenset(class_map.values())
-    for pair in settings.proximity.pairs:
-        for side in pair:
-            if not side_classes(side) & visible:
-                raise ConfigError(
-                    expected=f"a model that can see both sides of proximity.pairs {list(pair)}",
-                    found=f"one without any {side} (its labels give {', '.join(sorted(visible))})",
-                    fix="choose another model, map its labels with detect.class_map, or change proximity.pairs",
-                )
-    if any(one.box_px is None for one in settings.ground.references) and "reference" not in visible:
-        raise ConfigError(
-            expected="to know where the reference object is",
-            found="neither a box nor a model with a class `reference`",
-            fix="give --reference-box left,top,right,bottom, or ground.reference.box_px",
-        )
-
-
-def build_pipeline(settings: Settings, frames: Iterable[Frame], camera: CameraPrior | None = None) -> Pipeline:
-    """Make one stream's pipeline, without sinks; all state belongs to the objects made here.
-
-    Args:
-        settings: What to build.
-        frames: The source.
-        camera: What the source knows of its camera.
-
-    Raises:
-        StandoffError: A model, survey, camera or replacement that cannot be used.
-    """
-    detector = build_stage("detect", settings)
-    _check_visible(settings, detector)
-    return Pipeline(
-        frames=frames,
-        detector=detector,
-        motion=build_stage("motion", settings),
-        ground=build_stage("ground", settings, camera),
-        tracker=build_stage("track", settings),
-        locator=build_stage("locate", settings),
-        watcher=build_stage("watched", settings, detector=detector),
-        proximity=build_stage("proximity", settings),
-        hazard=build_stage("hazard", settings),
-        detect_every=settings.detect_every,
-        detect_near_m=settings.detect_near_m,
-        sure_score=settings.track.start_score,
-    )

@@ -59,20 +59,25 @@ def read_settings_file(path: Path) -> dict[str, Any]:
     return loaded
 
 
+_NAMED: Final = {"model": SHIPPED_MODELS, "telemetry": ("none",)}
+"""What stands in place of a path and is none."""
+
+
 def _anchor_paths(settings: dict[str, Any], folder: Path) -> None:
     """Make paths absolute: those of a file are relative to it, not to wherever the program was started."""
-    ground = settings.get("ground")
+    ground, source = settings.get("ground"), settings.get("source")
     places = (
         (settings, "model"),
         (settings, "detections"),
-        (settings, "telemetry"),
+        (source, "telemetry"),
         (settings, "zones"),
         (ground, "survey"),
         (ground, "camera"),
     )
     for section, name in places:
-        named = section is settings and settings.get(name) in (*SHIPPED_MODELS, "none")
-        if isinstance(section, dict) and isinstance(section.get(name), str) and not named:
+        if not isinstance(section, dict) or not isinstance(section.get(name), str):
+            continue
+        if section[name] not in _NAMED.get(name, ()):
             section[name] = str((folder / section[name]).resolve())
 
 

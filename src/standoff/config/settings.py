@@ -6,13 +6,17 @@ import difflib
 from collections.abc import Iterable, Mapping
 from dataclasses import is_dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated, Any, Literal, get_type_hints
 
-from pydantic import BaseModel, ConfigDict, Field, ModelWrapValidatorHandler, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ModelWrapValidatorHandler, model_validator
+from pydantic.fields import FieldInfo
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from standoff.config.markers import MarkerSettings, check_markers
+from standoff.core.outputs import OUTPUTS
 from standoff.stages.detect import DetectParams, ShippedModel
+from standoff.stages.frames import SourceParams
 from standoff.stages.ground import MarkerFamily, ReferenceParams, ReferenceShape
 from standoff.stages.hazard import HazardParams
 from standoff.stages.locate import LocateParams
@@ -23,10 +27,14 @@ from standoff.stages.track import TrackParams
 from standoff.stages.watched import WatchedParams
 
 Point = tuple[float, float]
-OutputName = Literal["tracks", "proximity", "frames", "detections", "hazards", "video", "report"]
-OUTPUT_NAMES: tuple[OutputName, ...] = ("tracks", "proximity", "frames", "detections", "hazards", "video", "report")
 StageName = Literal["detect", "motion", "ground", "track", "locate", "watched", "proximity", "hazard"]
 STAGE_NAMES: tuple[StageName, ...] = ("detect", "motion", "ground", "track", "locate", "watched", "proximity", "hazard")
+
+
+def _known_output(name: str) -> str:
+    if name not in OUTPUTS:
+        raise ValueError(f"no output; there are {', '.join(OUTPUTS)}")
+    return name
 
 
 class _Section(BaseModel):
@@ -186,16 +194,7 @@ class Settings(BaseSettings):
             "are replayed; model, detect and a detect stage of your own then have no effect."
         ),
     ] = None
-    start_s: Annotated[float, Field(ge=0, description="Begin here; s.")] = 0.0
-    stop_s: Annotated[float | None, Field(gt=0, description="End here; s. Absent: the source's end.")] = None
-    every: Annotated[int, Field(ge=1, description="Read every k-th frame only.")] = 1
-    fps: Annotated[float | None, Field(gt=0, description="Frames a second of an image folder.")] = None
-    telemetry: Annotated[
-        Literal["none"] | Path | None,
-        Field(
-            description="The drone's log (.srt), or none. Absent: the log beside the film, or the pictures' EXIF data."
-        ),
-    ] = None
+    source: Annotated[SourceParams, Field(description="Which part of the source is read, and how.")] = SourceParams()
     detect_every: Annotated[int, Field(ge=1, description="Detect on every k-th frame read; tracks coast between.")] = 1
     detect_near_m: Annotated[
         float | None,
@@ -219,7 +218,10 @@ class Settings(BaseSettings):
     ] = None
     proximity: Annotated[ProximityParams, Field(description="Distances of pairs.")] = ProximityParams()
     hazard: Annotated[HazardParams, Field(description="From distances to warnings.")] = HazardParams()
-    outputs: Annotated[tuple[OutputName, ...], Field(description="What is written beside run.json.")] = OUTPUT_NAMES
+    outputs: Annotated[
+        tuple[Annotated[str, AfterValidator(_known_output)], ...],
+        Field(description="What is written beside run.json."),
+    ] = tuple(OUTPUTS)
     tables: Annotated[TableParams, Field(description="The Parquet tables.")] = TableParams()
     show: Annotated[ShowParams, Field(description="How people read lengths and see people.")] = ShowParams()
     video: Annotated[VideoParams, Field(description="The annotated video.")] = VideoParams()
@@ -230,7 +232,7 @@ class Settings(BaseSettings):
     @model_validator(mode="before")
     @classmethod
     def _refuse_unknown_names(cls, values: dict[str, Any]) -> dict[str, Any]:
-        _refuse_unknown_key(values, cls.model_fields, "the top level")
+        _refuse_unknown_key(values, cls.model_fields, "the top level", _inner_names(cls.model_fields))
         for name, info in cls.model_fields.items():
             _refuse_unknown(info.annotation, values.get(name), name)
         return values
@@ -244,7 +246,7 @@ class Settings(BaseSettings):
 
     @model_validator(mode="after")
     def _refuse_taken_names(self) -> Settings:
-        taken = sorted(self.extra_outputs.keys() & {*OUTPUT_NAMES, "record"})
+        taken = sorted(self.extra_outputs.keys() & {*OUTPUTS, "record"})
         if taken:
             raise ValueError(f"extra_outputs: {', '.join(taken)} is the name of an output of standoff's own")
         return self
@@ -272,10 +274,20 @@ def _refuse_boolean(given: object, made: object, path: str) -> None:
         raise ValueError(f"{path}: {str(given).lower()} where a number should be")
 
 
-def _refuse_unknown_key(given: Mapping[str, object], known: Iterable[str], path: str) -> None:
+def _inner_names(fields: Mapping[str, FieldInfo]) -> dict[str, str]:
+    """Return by the name of a setting inside a section which section has it, the first one of several."""
+    sections = {name: info.annotation for name, info in reversed(fields.items()) if is_dataclass(info.annotation)}
+    return {inner: name for name, annotation in sections.items() for inner in get_type_hints(annotation)}
+
+
+def _refuse_unknown_key(
+    given: Mapping[str, object], known: Iterable[str], path: str, elsewhere: Mapping[str, str] = MappingProxyType({})
+) -> None:
     names = list(known)
     for key in given:
         if key not in names:
             near = difflib.get_close_matches(str(key), names, n=1)
+            if key in elsewhere:
+                near = [f"{elsewhere[key]}.{key}"]
             meant = f"did you mean {near[0]}?" if near else f"there are {', '.join(names)}"
             raise ValueError(f"{path} has no setting {key!r}; {meant}")

@@ -9,20 +9,22 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
-from typing import ClassVar, Literal, Protocol
+from typing import Any, ClassVar, Literal, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from standoff.core.ground_map import GroundMap as GroundMap
 from standoff.core.ground_map import NoGroundMap as NoGroundMap
-from standoff.core.hazard_event import Hazard as Hazard
-from standoff.core.hazard_event import Phase as Phase
-from standoff.core.hazard_event import Severity as Severity
+from standoff.core.hazards import Hazard as Hazard
+from standoff.core.hazards import OpenHazards as OpenHazards
+from standoff.core.hazards import Phase as Phase
+from standoff.core.hazards import Severity as Severity
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.motions import CameraMotion as CameraMotion
 from standoff.core.motions import NoCameraMotion as NoCameraMotion
 from standoff.core.rows import Columns, Rows
+from standoff.core.run_counts import RunCounts as RunCounts
 from standoff.core.telemetry import Telemetry
 from standoff.core.watched_ground import WatchedGround as WatchedGround
 
@@ -333,8 +335,10 @@ class FrameResult:
         tracks: Live tracks.
         positions: Row i belongs to track i.
         proximities: All configured pairs.
-        hazards: The events of this frame, not the state.
-        stage_ms: Milliseconds spent in each stage on this frame; sinks add theirs ("sinks.NAME") one after another.
+        hazards: The events of this frame.
+        open_hazards: Which hazards are open after them.
+        stage_ms: Milliseconds spent in each stage on this frame; in what a run yields those of its outputs, too
+            ("sinks.NAME").
         unfollowed: (K,) which of the frame's sure detections no track shows; left out: there were none.
         watched: Where on the ground a worker would be found; left out: nobody judged.
     """
@@ -351,6 +355,26 @@ class FrameResult:
     stage_ms: Mapping[str, float]
     unfollowed: BoolArray = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
     watched: WatchedGround = field(default_factory=WatchedGround)
+    open_hazards: OpenHazards = field(default_factory=OpenHazards)
+
+
+@dataclass(frozen=True, slots=True)
+class Silence:
+    """A moment at which a stream should have told something and did not: nothing that was true before is known now.
+
+    Attributes:
+        stream_id: Name of the stream.
+        time_s: When, in presentation time.
+        reason: Why nothing arrives.
+        hazards: The events of this moment.
+        open_hazards: Which hazards are open after them.
+    """
+
+    stream_id: str
+    time_s: float
+    reason: str
+    hazards: tuple[Hazard, ...]
+    open_hazards: OpenHazards
 
 
 @dataclass(frozen=True, slots=True)
@@ -358,25 +382,19 @@ class Outcome:
     """How a run ended; sinks are closed with it.
 
     Attributes:
-        status: "complete"; "interrupted" by the operator; "failed" with the source, the model or a stage.
+        status: "complete"; "interrupted" by the operator; "failed" with the source, the model or a stage; a stream that
+            was lost has failed.
         message: One line; empty when complete.
-        hazards: The closing events of hazards that were open when the stream ended.
+        hazards: The last events of the hazards that were open when the stream ended: closed, or unknown where it
+            failed.
         sink_errors: Message of each sink that gave up during the run, by sink name.
+        counts: What happened in it.
+        about: What its source and stages say of themselves at the end, by heading; `warnings` among them.
     """
 
     status: Literal["complete", "interrupted", "failed"]
     message: str = ""
     hazards: tuple[Hazard, ...] = ()
     sink_errors: Mapping[str, str] = field(default_factory=dict)
-
-
-class Sink(Protocol):
-    """Something that writes results down."""
-
-    def write(self, result: FrameResult) -> None:
-        """Take one frame's result."""
-        ...
-
-    def close(self, outcome: Outcome) -> None:
-        """Finish what was written; called once, also after an interruption."""
-        ...
+    counts: RunCounts = field(default_factory=RunCounts)
+    about: Mapping[str, Any] = field(default_factory=dict)

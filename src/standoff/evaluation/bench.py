@@ -90,10 +90,9 @@ def bench_source(
         StandoffError: Something of it cannot be used.
     """
     with TemporaryDirectory() as folder:
-        run = open_run(source, Path(folder) / "run", settings)
+        drawing = {"drawing": DrawingSink(settings.video)} if "video" in settings.outputs else {}
+        run = open_run(source, Path(folder) / "run", settings, more_sinks=drawing)
         described = dict(run.source.description)
-        if "video" in run.pipeline.sinks:
-            run.pipeline.sinks = {"drawing": DrawingSink(settings.video), **run.pipeline.sinks}
         stages = collect_times(run, frames)
     return BenchReport(
         machine=machine(),
@@ -114,7 +113,7 @@ def bench_source(
 def _picture_baselines(source: Path, settings: Settings, frames: int) -> Iterator[Baseline]:
     if source.is_file():
         yield decoding_baseline(source, frames)
-    yield from picture_baselines(source, fps=settings.fps, frames=frames)
+    yield from picture_baselines(source, fps=settings.source.fps, frames=frames)
 
 
 def _detection_baselines(source: Path, settings: Settings, darknet: tuple[Path, Path] | None) -> Iterator[Baseline]:
@@ -122,6 +121,6 @@ def _detection_baselines(source: Path, settings: Settings, darknet: tuple[Path, 
         return
     detector = OnnxDetector(find_model(settings.model), settings.detect)
     width_px, height_px = detector.description["input_size_px"]
-    with open_source(source, fps=settings.fps, start_s=settings.start_s) as opened:
+    with open_source(source, fps=settings.source.fps, start_s=settings.source.start_s) as opened:
         frames = list(islice(opened, _DETECTION_FRAMES))
     yield detection_baseline(detector, frames, *darknet, size_px=(width_px, height_px))

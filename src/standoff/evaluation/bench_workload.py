@@ -16,13 +16,13 @@ import av
 import cv2
 import numpy as np
 
-from standoff.core import homography
+from standoff.core import homography, protocols
 from standoff.core.classes import CLASS_BY_NAME, CLASSES, Role, class_ids
 from standoff.core.homography import FloatArray
-from standoff.core.protocols import Ground
-from standoff.core.types import Detections, Frame, FrameResult, ImageArray, Outcome, Sink
+from standoff.core.protocols import Ground, Sink
+from standoff.core.types import Detections, Frame, FrameResult, ImageArray, Outcome
 from standoff.evaluation.timing import StageTimes, collect_times
-from standoff.pipeline import Pipeline
+from standoff.monitor import Monitor, Run
 from standoff.stages.frames import AvPicture, Scaler
 from standoff.stages.ground import ReferenceGround, ReferenceShape, SurveyedGround
 from standoff.stages.hazard import HazardMonitor
@@ -35,12 +35,11 @@ from standoff.stages.sinks import (
     TRACKS,
     Composer,
     HazardSink,
-    RecordSink,
     ReportSink,
     TableSink,
     VideoParams,
 )
-from standoff.stages.sinks.scene import OpenHazards, Scene
+from standoff.stages.sinks.scene import Scene
 from standoff.stages.track import Tracker
 from standoff.stages.watched import GroundWatcher
 
@@ -120,13 +119,6 @@ class Site:
         cv2.fillConvexPoly(picture, outline, (220, 220, 220), cv2.LINE_AA, 4)
         return picture
 
-    def frames(self, count: int) -> Iterator[Frame]:
-        """Yield the same YUV picture again and again, unconverted each time."""
-        decoded = av.VideoFrame.from_ndarray(self.picture(), format="bgr24").reformat(format="yuv420p")
-        scaler = Scaler()
-        for index in range(count):
-            yield Frame("workload", index, index / _RATE_FPS, AvPicture(decoded, scaler=scaler))
-
     def ground(self, kind: Literal["surveyed", "reference"]) -> Ground:
         """Return a ground stage that knows the site."""
         if kind == "reference":
@@ -134,7 +126,34 @@ class Site:
         return SurveyedGround(self.to_image(_SURVEYED_M), _SURVEYED_M, self.size_px)
 
 
-class ScriptedDetector:
+class SiteFilm(protocols.Source):
+    """A film of the site: the same YUV picture again and again, unconverted each time.
+
+    Args:
+        site: What it shows.
+        count: How many frames it has.
+    """
+
+    def __init__(self, site: Site, count: int) -> None:
+        self._site, self._count = site, count
+
+    @property
+    def size_px(self) -> tuple[int, int]:
+        """(width, height) of every frame."""
+        return self._site.size_px
+
+    def frames(self) -> Iterator[Frame]:
+        """Yield the frames."""
+        decoded = av.VideoFrame.from_ndarray(self._site.picture(), format="bgr24").reformat(format="yuv420p")
+        scaler = Scaler()
+        for index in range(self._count):
+            yield Frame("workload", index, index / _RATE_FPS, AvPicture(decoded, scaler=scaler))
+
+    def close(self) -> None:
+        """Do nothing: there is no file."""
+
+
+class ScriptedDetector(protocols.Detector):
     """See what the site says is there."""
 
     def __init__(self, site: Site) -> None:
@@ -150,17 +169,15 @@ class DrawingSink:
 
     def __init__(self, params: VideoParams | None = None) -> None:
         self._params = params or VideoParams()
-        self._hazards = OpenHazards()
         self._composer: Composer | None = None
 
     def write(self, result: FrameResult) -> None:
         """Draw this frame."""
         frame = result.frame
         self._composer = self._composer or Composer(frame.size_px, self._params)
-        self._hazards.update(result.hazards)
         size_px = self._composer.picture_size_px
         picture = frame.image if size_px == frame.size_px else frame.picture.resized_bgr(*size_px)
-        self._composer.compose(picture, Scene.of(result, self._hazards))
+        self._composer.compose(picture, Scene.of(result))
 
     def close(self, outcome: Outcome) -> None:
         """Do nothing: there is no file."""
@@ -185,8 +202,7 @@ def monitor_workload(
     """
     site = Site(size_px, tracks)
     with TemporaryDirectory() as folder:
-        pipeline = Pipeline(
-            frames=site.frames(frames),
+        monitor = Monitor(
             detector=ScriptedDetector(site),
             motion=MotionEstimator(),
             ground=site.ground(ground),
@@ -195,9 +211,8 @@ def monitor_workload(
             watcher=GroundWatcher(),
             proximity=ProximityMeter(),
             hazard=HazardMonitor(),
-            sinks=_sinks(Path(folder)),
         )
-        return collect_times(pipeline.run())
+        return collect_times(Run(SiteFilm(site, frames), monitor, _sinks(Path(folder))))
 
 
 def _sinks(folder: Path) -> dict[str, Sink]:
@@ -207,5 +222,4 @@ def _sinks(folder: Path) -> dict[str, Sink]:
         "hazards": HazardSink(folder / "hazards.jsonl"),
         "drawing": DrawingSink(),
         "report": ReportSink(folder / "report.html"),
-        "record": RecordSink(folder / "run.json", {}),
     }

@@ -23,6 +23,7 @@ from standoff.evaluation.paper.map_only import MapScore, score_map
 from standoff.evaluation.paper.pairs import PairGroup, group_pairs, pair_series
 from standoff.evaluation.paper.trial import Trial, build_monitor, settings_for
 from standoff.evaluation.paper.watch import Notes, open_clip_video
+from standoff.monitor import Run
 
 Pair = tuple[int, int]
 Kind = Literal["near miss", "breach"]
@@ -116,7 +117,7 @@ def score_papers_method(clip: Clip, recording: Path, on_frame: Callable[[], None
     trial = Trial("paper", recording)
     with open_clip_video(clip) as source:
         witness = ClipWitness(clip, settings_for(clip, trial), source.size_px)
-        with closing(build_monitor(clip, trial, source).run()) as results:
+        with closing(iter(Run(source, build_monitor(clip, trial, source)))) as results:
             for result in results:
                 witness.take(result)
                 if on_frame is not None:

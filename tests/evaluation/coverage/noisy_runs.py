@@ -6,20 +6,20 @@ motion of the picture is exact. Tracks, places and distances are the stages' own
 
 from __future__ import annotations
 
-from contextlib import closing
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
 
-from standoff.core import homography
+from standoff.core import homography, protocols
 from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.homography import FloatArray
 from standoff.core.pose import LENS, SHIFT, TURN, View
 from standoff.core.types import CameraMotion, Detections, Frame, GroundMap, NoCameraMotion
 from standoff.evaluation.coverage import ClipSamples, read_samples
-from standoff.pipeline import Pipeline
+from standoff.monitor import Monitor, Run
 from standoff.simulation.presets import plan_clip
 from standoff.simulation.record import record_truth
 from standoff.stages.frames.pictures import ArrayPicture
@@ -28,7 +28,7 @@ from standoff.stages.ground.pose_map import map_from_view
 from standoff.stages.hazard import HazardMonitor
 from standoff.stages.locate import Locator
 from standoff.stages.proximity import ProximityMeter
-from standoff.stages.sinks.tables import FRAMES, PROXIMITY, TableSink, tracks_table
+from standoff.stages.sinks.tables import FRAMES, PROXIMITY, ZONED_TRACKS, TableSink
 from standoff.stages.track import Tracker
 from standoff.stages.watched import GroundWatcher
 
@@ -37,7 +37,7 @@ _TURN_RAD, _SHIFT_M, _FOCAL = 0.003, 0.1, 0.005
 _BOX = ("x1_px", "y1_px", "x2_px", "y2_px")
 
 
-class _Views:
+class _Views(protocols.Source, protocols.Detector):
     """A clip's camera in every frame: detector, motion and ground stage in one, as far as they need it."""
 
     def __init__(self, clip: Path, seed: int) -> None:
@@ -59,10 +59,19 @@ class _Views:
         self._covariance = np.diag(sigma**2)
         self._change: FloatArray = sigma * np.random.default_rng(seed).normal(size=8)
 
-    def frames(self) -> list[Frame]:
+    @property
+    def size_px(self) -> tuple[int, int]:
         camera = self._views[0].camera
-        nothing = ArrayPicture(np.zeros((camera.height_px, camera.width_px, 3), dtype=np.uint8))
-        return [Frame("noisy", k, time_s, nothing) for k, time_s in enumerate(self.times_s)]
+        return camera.width_px, camera.height_px
+
+    def frames(self) -> Iterator[Frame]:
+        width_px, height_px = self.size_px
+        nothing = ArrayPicture(np.zeros((height_px, width_px, 3), dtype=np.uint8))
+        for k, time_s in enumerate(self.times_s):
+            yield Frame("noisy", k, time_s, nothing)
+
+    def close(self) -> None:
+        pass
 
     def detect(self, frame: Frame) -> Detections:
         return self._found[self._frame_of == frame.index]
@@ -77,7 +86,7 @@ class _Views:
         return map_from_view(view, self._covariance, method="drawn", scale_m_per_px=0.03, anchors_px=np.zeros((0, 2)))
 
 
-class _Motion:
+class _Motion(protocols.CameraMotionEstimator):
     def __init__(self, views: _Views) -> None:
         self._views = views
 
@@ -85,7 +94,7 @@ class _Motion:
         return self._views.moved(frame)
 
 
-class _Ground:
+class _Ground(protocols.Ground):
     def __init__(self, views: _Views) -> None:
         self._views = views
 
@@ -110,14 +119,14 @@ def samples_of(preset: str, seed: int, folder: Path, *, frames: int, clutter: fl
     record_truth(plan, clip, processes=1)
     run.mkdir()
     views = _Views(clip, seed)
-    tables = {"tracks": tracks_table(), "proximity": PROXIMITY, "frames": FRAMES}
+    tables = {"tracks": ZONED_TRACKS, "proximity": PROXIMITY, "frames": FRAMES}
     sinks = {name: TableSink(run / f"{name}.parquet", table) for name, table in tables.items()}
-    pipeline = Pipeline(
-        frames=views.frames(), detector=views, motion=_Motion(views), ground=_Ground(views), tracker=Tracker(),
-        locator=Locator(), watcher=GroundWatcher(), proximity=ProximityMeter(), hazard=HazardMonitor(), sinks=sinks,
+    monitor = Monitor(
+        detector=views, motion=_Motion(views), ground=_Ground(views), tracker=Tracker(),
+        locator=Locator(), watcher=GroundWatcher(), proximity=ProximityMeter(), hazard=HazardMonitor(),
     )  # fmt: skip
-    with closing(pipeline.run()) as results:
-        for _ in results:
-            pass
-    assert not pipeline.sink_errors
+    noisy = Run(views, monitor, sinks)
+    for _ in noisy:
+        pass
+    assert not noisy.sink_errors
     return read_samples(run, clip)

@@ -8,6 +8,7 @@ import pytest
 from evaluation.paper import drawn_clip
 from labelled_sets import write_yolo
 
+from standoff.core import protocols
 from standoff.core.errors import ConfigError, DataError
 from standoff.core.types import Detections, Frame
 from standoff.evaluation.detection.grouping import site_grouping
@@ -20,7 +21,7 @@ from standoff.evaluation.paper.localisation import true_scale_m_per_px
 SHIFT_PX = 0.5
 
 
-class ShiftedTruth:
+class ShiftedTruth(protocols.Detector):
     """Sees every true box a little to the right, and remembers which frames it was shown."""
 
     def __init__(self, material: Material) -> None:

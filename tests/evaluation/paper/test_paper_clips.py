@@ -13,6 +13,7 @@ from evaluation.paper import drawn_clip
 
 from standoff.config import Settings, build_stage
 from standoff.config.settings import StageName
+from standoff.core import protocols
 from standoff.core.camera import CameraPrior
 from standoff.core.errors import DataError
 from standoff.core.types import Detections, Frame, NoCameraMotion, NoGroundMap
@@ -200,12 +201,16 @@ def test_a_preset_gets_the_papers_figures_that_are_its_own(copy_of: Path, preset
     assert all("benchmark itself" not in group.scores for group in result.groups)
 
 
-class ShiftedBoxes:
+class ShiftedBoxes(protocols.Detector):
     """Sees as a model does: without names, two pixels to the right, and never the loader."""
 
     def __init__(self, clip: Clip, sees: str) -> None:
         self._truth = TrueBoxes(clip)
-        self.description = {"class_map": {"a": "worker", "b": sees}}
+        self._sees = sees
+
+    @property
+    def description(self) -> dict[str, dict[str, str]]:
+        return {"class_map": {"a": "worker", "b": self._sees}}
 
     def detect(self, frame: Frame) -> Detections:
         seen = self._truth.detect(frame)

@@ -134,4 +134,4 @@ def test_an_area_of_the_picture_is_refused_where_the_camera_may_move() -> None:
 
 def test_pictures_of_another_shape_than_the_survey_s_are_refused() -> None:
     with pytest.raises(GroundError, match="survey's shape"):
-        following(survey()).check_size((640, 480))
+        following(survey()).prepare((640, 480))

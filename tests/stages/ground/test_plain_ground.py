@@ -49,12 +49,12 @@ def test_an_outline_somewhere_else_is_not_taken_for_the_reference() -> None:
 @pytest.mark.parametrize("box", [[400.0, 10.0, 500.0, 90.0], [10.0, 300.0, 90.0, 400.0]])
 def test_a_box_outside_the_picture_is_told_before_the_first_frame(box: list[float]) -> None:
     with pytest.raises(GroundError, match="320x240"):
-        ReferenceGround(ReferenceShape.square(2.0), place=GivenPlace(box_xyxy_px=box)).check_size((320, 240))
+        ReferenceGround(ReferenceShape.square(2.0), place=GivenPlace(box_xyxy_px=box)).prepare((320, 240))
 
 
 def test_a_survey_of_another_shape_is_told_before_the_first_frame() -> None:
     points = np.array([[10.0, 10.0], [300.0, 10.0], [300.0, 200.0], [10.0, 200.0]])
     survey = SurveyedGround(points, points / 20.0, (320, 240))
-    survey.check_size((640, 480))
+    survey.prepare((640, 480))
     with pytest.raises(GroundError, match="320x240"):
-        survey.check_size((1920, 1080))
+        survey.prepare((1920, 1080))

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from walking_crowd import body_points, box_of, random_crowd
 
-from standoff.core import homography
+from standoff.core import homography, protocols
 from standoff.core.camera import CameraPrior
 from standoff.core.homography import FloatArray
 from standoff.core.pose import view_from_homography
@@ -24,13 +24,16 @@ _PICTURE = GrayPicture(np.zeros((720, 1280), dtype=np.uint8))
 _CAMERA = _CROWD.view.camera
 
 
-class Mapped:
+class Mapped(protocols.Ground):
     """A ground stage whose metres are wrong by a factor."""
 
     def __init__(self, factor: float) -> None:
         image_to_ground = np.diag([factor, factor, 1.0]) @ homography.invert(_CROWD.view.plane_to_pinhole())
         self.map = GroundMap(image_to_ground, np.zeros((9, 9)), (1280, 720), "test", 1.0, camera=_CAMERA)
-        self.description = {"method": "test", "warnings": ["its own"]}
+
+    @property
+    def description(self) -> dict[str, object]:
+        return {"method": "test", "warnings": ["its own"]}
 
     def update(self, frame: Frame, detections: Detections, motion: AnyMotion) -> AnyGround:
         return self.map

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -12,6 +12,7 @@ from standoff.core import homography
 from standoff.core.camera import Camera
 from standoff.core.classes import CLASSES, Role
 from standoff.core.homography import FloatArray
+from standoff.core.run_counts import RunCounts
 from standoff.core.types import (
     Detections,
     Frame,
@@ -24,6 +25,8 @@ from standoff.core.types import (
     Luma,
     NoCameraMotion,
     NoGroundMap,
+    OpenHazards,
+    Outcome,
     Proximities,
     Severity,
     Tracks,
@@ -31,6 +34,7 @@ from standoff.core.types import (
 from standoff.stages.frames.pictures import halved
 
 WARNING_GAP_M = 3.0
+COMPLETE = Outcome("complete")
 
 
 @dataclass(frozen=True)
@@ -99,6 +103,7 @@ class FakeSite:
         self.track_id: IntArray = np.arange(1, tracks + 1)
         self._background = self._textured_ground()
         self._severity: dict[tuple[int, int], Severity] = {}
+        self._open = OpenHazards()
 
     def ground(self, age_s: float = 0.0) -> GroundMap:
         anchors_m = np.array([[-1.0, -1.0], [3.0, -1.0], [3.0, 3.0], [-1.0, 3.0]])
@@ -148,6 +153,7 @@ class FakeSite:
         positions = self._positions(time_s, xy, lost)
         proximities = self._proximities(positions)
         hazards = self._hazards(time_s, proximities, last)
+        self._open = self._open.after(hazards)
         return FrameResult(
             frame=Frame("site", index, time_s, FakePicture(image)),
             detections=Detections(np.array(boxes), np.full(len(xy), 0.8), self.class_id),
@@ -159,6 +165,7 @@ class FakeSite:
             proximities=proximities,
             hazards=hazards,
             stage_ms={"detect": 20.0, "ground": 2.0 + index % 3, "track": 0.3},
+            open_hazards=self._open,
         )
 
     def _positions(self, time_s: float, xy: FloatArray, lost: bool) -> GroundPositions:
@@ -267,3 +274,17 @@ class FakeSite:
             ground, self.ground_to_image @ to_metres, self.size_px, borderMode=cv2.BORDER_REFLECT
         )
         return np.asarray(picture, dtype=np.uint8)
+
+
+def quiet(result: FrameResult) -> FrameResult:
+    """Return the result as if no hazard were open."""
+    return replace(result, hazards=(), open_hazards=OpenHazards())
+
+
+def ended(results: Iterable[FrameResult], outcome: Outcome = COMPLETE) -> Outcome:
+    """Return an outcome that has counted these results."""
+    counts = RunCounts()
+    for result in results:
+        counts.add(result)
+    counts.add_events(outcome.hazards)
+    return replace(outcome, counts=counts)

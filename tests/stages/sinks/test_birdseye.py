@@ -5,14 +5,14 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
-from stages.sinks.fake_site import FakePicture, FakeSite
+from stages.sinks.fake_site import FakePicture, FakeSite, quiet
 
 from standoff.core.camera import Camera
 from standoff.core.types import Frame, FrameResult
 from standoff.stages.sinks import DrawParams
 from standoff.stages.sinks.birdseye import BirdsEye
 from standoff.stages.sinks.ground_window import camera_up, rectify, seen_ground_m, window_around
-from standoff.stages.sinks.scene import OpenHazards, Scene
+from standoff.stages.sinks.scene import Scene
 from standoff.stages.sinks.sketch import Sketch
 
 LENS = Camera(640, 360, np.array([[450.0, 0, 320], [0, 450, 180], [0, 0, 1]]), np.array([-0.2, 0.05, 0, 0, 0]))
@@ -20,7 +20,7 @@ PANEL = (300, 400)
 
 
 def _sketch(result: FrameResult) -> Sketch:
-    return Sketch.of(Scene.of(result, OpenHazards()), DrawParams())
+    return Sketch.of(Scene.of(quiet(result)), DrawParams())
 
 
 @pytest.mark.parametrize("camera", [None, LENS])

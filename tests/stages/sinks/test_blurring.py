@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from laws import examples
-from stages.sinks.fake_site import FakePicture, FakeSite
+from stages.sinks.fake_site import FakePicture, FakeSite, ended, quiet
 from tolerances import ENCODED_LEVELS
 
 from standoff.core.homography import BoolArray, FloatArray
@@ -24,7 +24,7 @@ from standoff.stages.sinks.birdseye import BirdsEye
 from standoff.stages.sinks.blurring import PeopleWatch, blur
 from standoff.stages.sinks.collect import RunSummary
 from standoff.stages.sinks.drawing import Overlay
-from standoff.stages.sinks.scene import OpenHazards, Scene
+from standoff.stages.sinks.scene import Scene
 from standoff.stages.sinks.sketch import Sketch
 from standoff.stages.sinks.text import TextSprites
 
@@ -205,8 +205,8 @@ def test_in_the_film_nothing_but_people_changes(size_px: tuple[int, int]) -> Non
     hidden_px = PeopleWatch(wanted=True).update(result)
     picture = result.frame.picture.resized_bgr(*size_px)
     composer = Composer(SIZE, params)
-    plain = composer.compose(picture, Scene.of(result, OpenHazards())).copy()
-    blurred = composer.compose(picture, Scene.of(result, OpenHazards(), (), hidden_px)).copy()
+    plain = composer.compose(picture, Scene.of(quiet(result))).copy()
+    blurred = composer.compose(picture, Scene.of(quiet(result), (), hidden_px)).copy()
     inside = _inside(hidden_px * size_px[0] / SIZE[0], size_px)
     np.testing.assert_array_equal(plain[~inside], blurred[~inside])
     assert _detail(blurred, inside) < 0.25 * _detail(plain, inside)
@@ -216,7 +216,7 @@ def test_without_blur_the_film_is_drawn_on_the_picture_as_it_is() -> None:
     result = FakeSite(SIZE).result(10)
     composer, params, text = Composer(SIZE, VideoParams(max_width_px=900)), DrawParams(), TextSprites()
     width, height = composer.picture_size_px
-    scene = Scene.of(result, OpenHazards(), (), PeopleWatch(wanted=False).update(result))
+    scene = Scene.of(quiet(result), (), PeopleWatch(wanted=False).update(result))
     picture = result.frame.picture.resized_bgr(width, height)
     composed = composer.compose(picture, scene).copy()
     by_hand, sketch = picture.copy(), Sketch.of(scene, params)
@@ -233,7 +233,7 @@ def test_the_panel_shows_the_blurred_picture() -> None:
     params = VideoParams(max_width_px=900, draw=DrawParams(circles=False, labels=False, fans=False, legend=False))
     composer = Composer(SIZE, params)
     width, height = composer.picture_size_px
-    scene = Scene.of(result, OpenHazards(), (), np.array([[-50.0, -50.0, 5000.0, 5000.0]]))
+    scene = Scene.of(quiet(result), (), np.array([[-50.0, -50.0, 5000.0, 5000.0]]))
     panel = composer.compose(result.frame.picture.resized_bgr(width, height), scene)[:, width:].copy()
     sharp = composer.compose(
         result.frame.picture.resized_bgr(width, height), replace(scene, hidden_px=np.zeros((0, 4)))
@@ -289,9 +289,10 @@ def test_the_page_says_that_people_are_blurred_and_embeds_no_sharp_picture(tmp_p
     site, pages = FakeSite((320, 180)), {}
     for wanted in (False, True):
         sink = ReportSink(tmp_path / "report.html", ReportParams(pairs=1, moments=1), show=ShowParams(blur=wanted))
-        for index in range(5):
-            sink.write(site.result(index))
-        sink.close(Outcome("complete"))
+        results = [site.result(index) for index in range(5)]
+        for result in results:
+            sink.write(result)
+        sink.close(ended(results))
         pages[wanted] = (tmp_path / "report.html").read_text(encoding="utf-8")
     sentence = "People are blurred; whom the detector missed is not."
     assert sentence in pages[True] and sentence not in pages[False]

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from stages.sinks.fake_site import FakeSite
+from stages.sinks.fake_site import FakeSite, quiet
 
 from standoff.core.types import FrameResult, ImageArray, NoGroundMap, Proximities
 from standoff.stages.sinks import DrawParams
 from standoff.stages.sinks.drawing import Overlay
 from standoff.stages.sinks.painter import Painter
 from standoff.stages.sinks.palette import bgr
-from standoff.stages.sinks.scene import OpenHazards, Scene
+from standoff.stages.sinks.scene import Scene
 from standoff.stages.sinks.sketch import Sketch
 from standoff.stages.sinks.text import TextSprites
 
@@ -22,9 +22,7 @@ TEXT = TextSprites()
 
 
 def _sketch(result: FrameResult, hazards: bool = True) -> Sketch:
-    open_hazards = OpenHazards()
-    open_hazards.update(result.hazards if hazards else ())
-    return Sketch.of(Scene.of(result, open_hazards), DrawParams())
+    return Sketch.of(Scene.of(result if hazards else quiet(result)), DrawParams())
 
 
 def _drawn(result: FrameResult, params: DrawParams | None = None) -> ImageArray:
@@ -51,11 +49,9 @@ def test_without_a_position_nobody_looks_at_ease() -> None:
 
 
 def test_an_open_hazard_keeps_its_colour_while_it_cannot_be_measured() -> None:
-    site, open_hazards = FakeSite(SIZE), OpenHazards()
-    for index in range(71):
-        result = site.result(index)
-        open_hazards.update(result.hazards)
-    sketch = Sketch.of(Scene.of(result, open_hazards), DrawParams())
+    site = FakeSite(SIZE)
+    results = [site.result(index) for index in range(71)]
+    sketch = Sketch.of(Scene.of(results[-1]), DrawParams())
     danger = [line for line in sketch.lines if line.tone == "danger"]
     assert danger
     assert all(line.text == "unknown" and line.dashed for line in danger)
@@ -76,11 +72,9 @@ def test_each_person_gets_one_line_to_the_nearest_machine() -> None:
 def test_a_far_pair_has_a_line_only_with_a_hazard() -> None:
     site = FakeSite(SIZE)
     result = site.result(0)
-    nearest_only = Sketch.of(Scene.of(result, OpenHazards()), DrawParams(line_within_m=0.1))
+    nearest_only = Sketch.of(Scene.of(quiet(result)), DrawParams(line_within_m=0.1))
     assert nearest_only.lines == []
-    open_hazards = OpenHazards()
-    open_hazards.update(result.hazards)
-    with_hazards = Sketch.of(Scene.of(result, open_hazards), DrawParams(line_within_m=0.1))
+    with_hazards = Sketch.of(Scene.of(result), DrawParams(line_within_m=0.1))
     assert len(with_hazards.lines) == len(result.hazards) > 0
 
 
@@ -100,7 +94,7 @@ def test_a_filtered_distance_is_marked() -> None:
 
 def test_a_hazard_turns_the_picture_red() -> None:
     site = FakeSite(SIZE)
-    calm = replace(site.result(0), hazards=())
+    calm = quiet(site.result(0))
     assert _share_of(_drawn(calm), bgr("danger")) < 0.0005  # the legend's bar
     assert _share_of(_drawn(FakeSite(SIZE).result(0)), bgr("danger")) > 0.002
 

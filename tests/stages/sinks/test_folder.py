@@ -5,7 +5,8 @@ from pathlib import Path
 import pytest
 
 from standoff.core.errors import OutputError
-from standoff.stages.sinks import OUTPUT_FILES, prepare_output
+from standoff.core.outputs import RUN_FILES
+from standoff.stages.sinks import prepare_output
 
 
 def test_a_new_folder_is_created_with_its_parents(tmp_path: Path) -> None:
@@ -41,7 +42,7 @@ def test_a_folder_that_takes_no_files_is_refused(tmp_path: Path, monkeypatch: py
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("name", [*OUTPUT_FILES, "tracks.parts", "frames.parts", ".report.html.partial"])
+@pytest.mark.parametrize("name", [*RUN_FILES, "tracks.parts", "frames.parts", ".report.html.partial"])
 def test_a_folder_that_holds_a_run_or_the_rest_of_one_is_refused(tmp_path: Path, name: str) -> None:
     _leave(tmp_path / name)
     with pytest.raises(OutputError, match=f"{name}.*--overwrite"):
@@ -49,7 +50,7 @@ def test_a_folder_that_holds_a_run_or_the_rest_of_one_is_refused(tmp_path: Path,
 
 
 def test_overwriting_removes_our_files_and_nothing_else(tmp_path: Path) -> None:
-    for name in (*OUTPUT_FILES, "tracks.parts"):
+    for name in (*RUN_FILES, "tracks.parts"):
         _leave(tmp_path / name)
     (tmp_path / "site.yaml").write_text("mine")
     prepare_output(tmp_path, overwrite=True)

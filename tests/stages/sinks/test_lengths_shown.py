@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 from pages import PageReader
-from stages.sinks.fake_site import FakeSite
+from stages.sinks.fake_site import FakeSite, ended, quiet
 
 from standoff.core.lengths import FEET, METRES, LengthUnit
 from standoff.core.types import FrameResult, ImageArray, Outcome
@@ -18,7 +18,7 @@ from standoff.stages.sinks import Composer, DrawParams, ReportParams, ReportSink
 from standoff.stages.sinks.birdseye import BirdsEye
 from standoff.stages.sinks.charts import read_in, themed_figure
 from standoff.stages.sinks.painter import Painter
-from standoff.stages.sinks.scene import OpenHazards, Scene
+from standoff.stages.sinks.scene import Scene
 from standoff.stages.sinks.sketch import Sketch
 from standoff.stages.sinks.text import TextSprites
 
@@ -32,17 +32,17 @@ def results() -> list[FrameResult]:
 
 
 def _page(folder: Path, results: list[FrameResult], show: ShowParams) -> str:
-    descriptions = {"ground": {"basis": "a square reference of 2.89 m: expect 1 %"}}
+    about = {"ground": {"basis": "a square reference of 2.89 m: expect 1 %"}}
     path = folder / f"{show.unit}.html"
-    sink = ReportSink(path, ReportParams(pairs=4, moments=1), descriptions, show=show)
+    sink = ReportSink(path, ReportParams(pairs=4, moments=1), show=show)
     for result in results:
         sink.write(result)
-    sink.close(Outcome("complete"))
+    sink.close(ended(results, Outcome("complete", about=about)))
     return path.read_text(encoding="utf-8")
 
 
 def test_lines_of_the_film_say_the_same_distances(results: list[FrameResult]) -> None:
-    scene = Scene.of(results[0], OpenHazards())
+    scene = Scene.of(quiet(results[0]))
     in_metres, in_feet = (Sketch.of(scene, DrawParams(), unit).lines for unit in (METRES, FEET))
     assert len(in_metres) > 2
     for one, other in zip(in_metres, in_feet, strict=True):
@@ -66,7 +66,7 @@ def test_the_panels_scale_bar_is_as_long_as_it_says(
 
     monkeypatch.setattr(text, "sprite", sprite)
     birdseye = BirdsEye(PANEL, DrawParams(circles=False, labels=False, fans=False), text)
-    sketch = Sketch.of(Scene.of(results[0], OpenHazards()), DrawParams(), unit)
+    sketch = Sketch.of(Scene.of(quiet(results[0])), DrawParams(), unit)
     birdseye.draw(panel, results[0].frame.image, sketch)
     (label,) = {word for word in said if word.endswith(f" {unit.symbol}")}
     window = birdseye._window
@@ -125,7 +125,7 @@ def _distances(text: str) -> list[float]:
 
 def test_the_film_differs_in_its_words_only(results: list[FrameResult]) -> None:
     plain = VideoParams(panel=False, draw=DrawParams(labels=False))
-    scene = Scene.of(results[0], OpenHazards())
+    scene = Scene.of(quiet(results[0]))
     image = results[0].frame.image
     first, other = (
         Composer((320, 180), plain, ShowParams(unit=name)).compose(cv2.resize(image, (320, 180)), scene).copy()

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 from pages import PageReader, without_pictures
-from stages.sinks.fake_site import FakeSite
+from stages.sinks.fake_site import COMPLETE, FakeSite, ended, quiet
 
 from standoff.core.lengths import METRES
 from standoff.core.types import FrameResult, Hazard, NoGroundMap, Outcome
@@ -30,12 +30,12 @@ _PLAIN = ReportParams(pairs=1, moments=0)
 """For what is said in words: charts take a second a page."""
 
 
-def _page(folder: Path, results: list[FrameResult], outcome: Outcome | None = None, **arguments: Any) -> str:
+def _page(folder: Path, results: list[FrameResult], outcome: Outcome = COMPLETE, **arguments: Any) -> str:
     sink = ReportSink(folder / "report.html", **arguments)
     for result in results:
         sink.write(result)
     assert list(folder.iterdir()) == []  # nothing half-written while the run goes on
-    sink.close(outcome or Outcome("complete"))
+    sink.close(ended(results, outcome))
     assert [path.name for path in folder.iterdir()] == ["report.html"]
     return (folder / "report.html").read_text(encoding="utf-8")
 
@@ -57,8 +57,7 @@ def test_reasons_and_descriptions_are_escaped(tmp_path: Path, results: list[Fram
     page = _page(
         tmp_path,
         results,
-        Outcome("failed", hostile, sink_errors={hostile: hostile}),
-        descriptions={"source": {"path": hostile}},
+        Outcome("failed", hostile, sink_errors={hostile: hostile}, about={"source": {"path": hostile}}),
     )
     assert "<script" not in page
     assert "reference hidden &amp; &lt;not&gt; found" in page
@@ -104,7 +103,7 @@ def test_a_run_without_a_frame_knows_nothing(tmp_path: Path) -> None:
 
 
 def test_a_run_without_any_map_never_reads_as_safe(tmp_path: Path, results: list[FrameResult]) -> None:
-    text = PageReader.of(_page(tmp_path, [replace(results[70], hazards=()) for _ in range(5)], params=_PLAIN)).text
+    text = PageReader.of(_page(tmp_path, [quiet(results[70]) for _ in range(5)], params=_PLAIN)).text
     assert "Nothing was measured: no frame has a ground map. This report says nothing about safety." in text
     assert "Unknown: nothing was measured." in text
     assert "0 % of frames with a ground map" in text
@@ -114,7 +113,7 @@ def test_a_run_without_any_map_never_reads_as_safe(tmp_path: Path, results: list
 def test_measured_frames_without_hazard_and_lost_frames_are_told_apart(
     tmp_path: Path, results: list[FrameResult]
 ) -> None:
-    calm = [replace(result, hazards=()) for result in results]
+    calm = [quiet(result) for result in results]
     (tmp_path / "all").mkdir()
     (tmp_path / "some").mkdir()
     assert "Hazards None." in PageReader.of(_page(tmp_path / "all", calm[:25], params=_PLAIN)).text
@@ -124,9 +123,7 @@ def test_measured_frames_without_hazard_and_lost_frames_are_told_apart(
 
 
 def test_a_share_just_below_all_is_not_called_all(tmp_path: Path, results: list[FrameResult]) -> None:
-    few = [
-        replace(results[0], frame=replace(results[0].frame, index=i, time_s=i / 25), hazards=()) for i in range(2000)
-    ]
+    few = [replace(quiet(results[0]), frame=replace(results[0].frame, index=i, time_s=i / 25)) for i in range(2000)]
     few[7] = replace(few[7], ground=NoGroundMap("hidden"))
     text = PageReader.of(_page(tmp_path, few, params=_PLAIN)).text
     assert "99.9 % of frames with a ground map" in text

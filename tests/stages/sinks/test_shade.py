@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,12 +12,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from laws import examples
 from pages import PageReader
-from stages.sinks.fake_site import FakeSite
+from stages.sinks.fake_site import FakeSite, ended, quiet
 
 from standoff.core import homography
 from standoff.core.camera import Camera
 from standoff.core.homography import BoolArray
-from standoff.core.types import FrameResult, ImageArray, Outcome, WatchedGround
+from standoff.core.types import FrameResult, ImageArray, OpenHazards, Outcome, WatchedGround
 from standoff.core.watched_ground import (
     BEHIND_MACHINE,
     BLURRED,
@@ -34,7 +35,7 @@ from standoff.stages.hazard import HazardMonitor
 from standoff.stages.sinks import DrawParams, ReportParams, ReportSink
 from standoff.stages.sinks.birdseye import BirdsEye
 from standoff.stages.sinks.drawing import Overlay
-from standoff.stages.sinks.scene import OpenHazards, Scene
+from standoff.stages.sinks.scene import Scene
 from standoff.stages.sinks.shade import PictureShade, diagonals
 from standoff.stages.sinks.sketch import Sketch
 from standoff.stages.sinks.text import TextSprites
@@ -55,9 +56,7 @@ def all_cells(value: int) -> CellArray:
 
 
 def sketch(result: FrameResult, watched: WatchedGround, params: DrawParams = BARE) -> Sketch:
-    open_hazards = OpenHazards()
-    open_hazards.update(result.hazards)
-    return Sketch.of(Scene.of(replace(result, watched=watched), open_hazards), params)
+    return Sketch.of(Scene.of(replace(result, watched=watched)), params)
 
 
 def noise(size_px: tuple[int, int], seed: int = 3) -> ImageArray:
@@ -213,7 +212,7 @@ def test_a_stream_of_which_no_ground_is_watched_says_so_as_plainly_as_one_withou
     site, monitor, watched = FakeSite(SIZE), HazardMonitor(), of_cells(all_cells(BLURRED))
     result = site.result(0)
     events = monitor.update(0.0, result.positions, result.proximities, result.ground, result.unfollowed, watched)
-    unseeing = sketch(replace(result, hazards=events), watched)
+    unseeing = sketch(replace(result, open_hazards=OpenHazards().after(events)), watched)
     assert unseeing.scene.unknown_words() == "UNKNOWN: no ground is watched: blurred"
     assert sketch(result, watched).scene.unknown_words() == ""
     lost = sketch(site.result(70), WatchedGround())
@@ -225,11 +224,12 @@ def test_a_stream_of_which_no_ground_is_watched_says_so_as_plainly_as_one_withou
         assert canvas[:20, : SIZE[0] // 2].min(axis=2).max() > 200  # white text in it
 
 
-def page(folder: Path, watched: list[WatchedGround], **arguments: object) -> str:
-    sink, site = ReportSink(folder / "report.html", ReportParams(pairs=1, moments=0), **arguments), FakeSite((160, 90))  # type: ignore[arg-type]
-    for index, one in enumerate(watched):
-        sink.write(replace(site.result(index), hazards=(), watched=one))
-    sink.close(Outcome("complete"))
+def page(folder: Path, watched: list[WatchedGround], about: Mapping[str, object] | None = None) -> str:
+    sink, site = ReportSink(folder / "report.html", ReportParams(pairs=1, moments=0)), FakeSite((160, 90))
+    results = [replace(quiet(site.result(index)), watched=one) for index, one in enumerate(watched)]
+    for result in results:
+        sink.write(result)
+    sink.close(ended(results, Outcome("complete", about=about or {})))
     return PageReader.of((folder / "report.html").read_text(encoding="utf-8")).text
 
 
@@ -250,7 +250,7 @@ def test_a_report_of_hardly_watched_ground_never_reads_as_safe(tmp_path: Path) -
     little[:3] = WATCHED
     for name, cells, said in (("little", little, "Only a part"), ("nothing", nothing, "Hardly any")):
         (tmp_path / name).mkdir()
-        text = page(tmp_path / name, [of_cells(cells)] * 3, descriptions={"watched": {"measured": False}})
+        text = page(tmp_path / name, [of_cells(cells)] * 3, {"watched": {"measured": False}})
         assert f"{said} of the ground was watched:" in text
         assert "None." not in text
         assert "Nobody measured how small a worker this detector finds" in text

@@ -11,28 +11,37 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from pages import PageReader
-from stages.sinks.fake_site import FakeSite
+from stages.sinks.fake_site import FakeSite, ended, quiet
 
 from standoff.core.camera import Camera
 from standoff.core.homography import FloatArray
-from standoff.core.types import FrameResult, GroundPositions, Hazard, ImageArray, Outcome, Proximities, Sink, Tracks
+from standoff.core.protocols import Sink
+from standoff.core.types import (
+    FrameResult,
+    GroundPositions,
+    Hazard,
+    ImageArray,
+    OpenHazards,
+    Outcome,
+    Proximities,
+    Tracks,
+)
 from standoff.core.zones import Zone
 from standoff.stages.hazard import HazardMonitor
 from standoff.stages.sinks import (
     TRACKS,
+    ZONED_TRACKS,
     DrawParams,
     HazardSink,
-    RecordSink,
     ReportParams,
     ReportSink,
     TableSink,
-    tracks_table,
 )
 from standoff.stages.sinks.birdseye import BirdsEye
 from standoff.stages.sinks.drawing import Overlay
 from standoff.stages.sinks.ground_shapes import clip_to_box, outlines_in_sight_px
 from standoff.stages.sinks.palette import bgr
-from standoff.stages.sinks.scene import OpenHazards, Scene
+from standoff.stages.sinks.scene import Scene
 from standoff.stages.sinks.sketch import Sketch
 from standoff.stages.sinks.text import TextSprites
 
@@ -55,20 +64,19 @@ ZONES = (PIT, ROAD)
 def watched() -> list[FrameResult]:
     """Three seconds with the hazards of the zones: the excavator is in the pit, a worker comes to the road."""
     site, monitor = FakeSite((160, 90)), HazardMonitor(zones=ZONES)
-    results = []
+    results, still_open = [], OpenHazards()
     for index in range(62):
         result = site.result(index)
         events = monitor.update(
             result.frame.time_s, result.positions, result.proximities, result.ground, result.unfollowed
         )
-        results.append(replace(result, hazards=events))
+        still_open = still_open.after(events)
+        results.append(replace(result, hazards=events, open_hazards=still_open))
     return results
 
 
 def sketch(result: FrameResult, hazards: Sequence[Hazard] = ()) -> Sketch:
-    open_hazards = OpenHazards()
-    open_hazards.update(hazards)
-    return Sketch.of(Scene.of(result, open_hazards, ZONES), DrawParams())
+    return Sketch.of(Scene.of(replace(result, open_hazards=OpenHazards().after(hazards)), ZONES), DrawParams())
 
 
 def drawn(result: FrameResult, hazards: Sequence[Hazard] = ()) -> ImageArray:
@@ -141,8 +149,7 @@ def test_a_zone_with_a_hazard_has_its_colour_and_the_entity_says_where_it_is() -
 def test_the_hazard_of_a_crossing_is_not_that_of_its_pair() -> None:
     crossing = replace(in_zone("danger"), track_ids=(1, 3))
     near = Hazard("P", "proximity", "warning", "opened", (1, 3), 0.0, 9.0, 0.5, 0.2)
-    open_hazards = OpenHazards()
-    open_hazards.update([near, crossing])
+    open_hazards = OpenHazards().after([near, crossing])
     assert open_hazards.by_pair() == {(1, 3): near}
     assert open_hazards.in_zones() == (crossing,)
 
@@ -170,7 +177,7 @@ def test_the_report_lists_the_zones_and_draws_them_on_the_plan(tmp_path: Path, w
     sink = ReportSink(tmp_path / "report.html", ReportParams(pairs=1, moments=0), zones=ZONES)
     for result in watched:
         sink.write(result)
-    sink.close(Outcome("complete"))
+    sink.close(ended(watched))
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     text = PageReader.of(page).text
     assert "excavator 3: zone pit" in text
@@ -183,9 +190,10 @@ def test_a_report_of_frames_without_a_stated_frame_says_that_no_zone_was_watched
 ) -> None:
     sink = ReportSink(tmp_path / "report.html", ReportParams(pairs=1, moments=0), zones=ZONES)
     elsewhere = replace(FakeSite((160, 90)).ground(), frame_stated=False)
-    for result in watched[:20]:
-        sink.write(replace(result, ground=elsewhere, hazards=()))
-    sink.close(Outcome("complete"))
+    results = [replace(quiet(result), ground=elsewhere) for result in watched[:20]]
+    for result in results:
+        sink.write(result)
+    sink.close(ended(results))
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     text = PageReader.of(page).text
     assert "Not watched in 20 of 20 measured frames: nobody stated where the site frame lies." in text
@@ -195,12 +203,12 @@ def test_a_report_of_frames_without_a_stated_frame_says_that_no_zone_was_watched
 def test_tables_events_and_the_record_say_the_zone_and_are_as_before_without_one(
     tmp_path: Path, watched: list[FrameResult]
 ) -> None:
-    hazards, record = HazardSink(tmp_path / "hazards.jsonl"), RecordSink(tmp_path / "run.json", {})
+    hazards = HazardSink(tmp_path / "hazards.jsonl")
     tables = {
         name: TableSink(tmp_path / f"{name}.parquet", table)
-        for name, table in (("zones", tracks_table()), ("plain", TRACKS))
+        for name, table in (("zones", ZONED_TRACKS), ("plain", TRACKS))
     }
-    sinks: list[Sink] = [hazards, record, *tables.values()]
+    sinks: list[Sink] = [hazards, *tables.values()]
     for result in watched:
         for sink in sinks:
             sink.write(result)
@@ -209,7 +217,7 @@ def test_tables_events_and_the_record_say_the_zone_and_are_as_before_without_one
     lines = [json.loads(line) for line in (tmp_path / "hazards.jsonl").read_text().splitlines()]
     assert {line["zone"] for line in lines if line["rule"] == "zone"} == {"pit", "haul road"}
     assert all("zone" not in line for line in lines if line["rule"] != "zone")
-    assert json.loads((tmp_path / "run.json").read_text())["counts"]["zones"] == {
+    assert ended(watched).counts.zones == {
         "haul road": {"danger": 1},
         "pit": {"danger": 1},
     }

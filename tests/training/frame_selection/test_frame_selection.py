@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from pycocotools import mask as coco_mask
 from pycocotools.coco import COCO
 
+from standoff.core import protocols
 from standoff.core.errors import SourceError
 from standoff.core.types import Detections, Frame, ImageArray
 from standoff.stages.frames import ArrayPicture
@@ -48,7 +49,7 @@ def _picture(frame: int) -> ImageArray:
     return np.asarray(image)
 
 
-class BrightSquare:
+class BrightSquare(protocols.Detector):
     """Find the bright square; as unsure of it as the frame's number says."""
 
     def __init__(self, score_of: Callable[[int], float]) -> None:
@@ -308,7 +309,7 @@ def test_frames_of_real_video_come_from_all_parts_with_people(shared_data: Path,
             x, y, w, h = (float(row[key]) for key in "xywh")
             people.setdefault(int(row["frame"]) - 1, []).append((x, y, x + w, y + h, 0.9))
 
-    class Truth:
+    class Truth(protocols.Detector):
         def detect(self, frame: Frame) -> Detections:
             return _boxes(*people.get(frame.index, []))
 

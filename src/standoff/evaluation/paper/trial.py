@@ -14,7 +14,7 @@ from standoff.core.errors import DataError
 from standoff.core.protocols import Detector, Tracker
 from standoff.evaluation.paper.clip import Clip, TrueReference
 from standoff.evaluation.paper.truth_detector import REFERENCE_MARGIN_PX, BoxError, TrueBoxes
-from standoff.pipeline import Pipeline
+from standoff.monitor import Monitor
 from standoff.stages.detect import RecordedDetector
 from standoff.stages.frames import Source
 from standoff.stages.ground import ReferenceShape, ScaleWatch
@@ -90,7 +90,7 @@ class Trial:
         return about
 
 
-def build_monitor(clip: Clip, trial: Trial, source: Source) -> Pipeline:
+def build_monitor(clip: Clip, trial: Trial, source: Source) -> Monitor:
     """Make the monitor for one clip.
 
     Args:
@@ -113,8 +113,7 @@ def build_monitor(clip: Clip, trial: Trial, source: Source) -> Pipeline:
     else:
         detector = tracker = TrueBoxes(clip, trial.box_error if trial.detector == "noisy" else None, trial.seed)
     ground = build_stage("ground", settings, source.camera_prior)
-    return Pipeline(
-        frames=source,
+    return Monitor(
         detector=detector,
         motion=build_stage("motion", settings),
         # Truth judges the metres here; a watch that withheld some of them would hide what the method does.
@@ -167,7 +166,7 @@ def _first_corner_px(clip: Clip, reference: TrueReference) -> list[float] | None
 
 
 def _check_reference_class(detector: Detector, model: Path) -> None:
-    class_map = getattr(detector, "description", {}).get("class_map")
+    class_map = detector.description.get("class_map")
     # A detector of somebody's own, replayed, may not say what it knows.
     if class_map is not None and "reference" not in class_map.values():
         raise DataError(

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from standoff.core import protocols
 from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.homography import FloatArray
 from standoff.core.protocols import AnyGround, AnyMotion
@@ -40,7 +41,7 @@ class BoxError:
         return sigma_px
 
 
-class TrueBoxes:
+class TrueBoxes(protocols.Detector, protocols.Tracker):
     """Detector and tracker of one clip: yields what can be seen, under the truth's own identities.
 
     Args:

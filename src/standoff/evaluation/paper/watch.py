@@ -21,6 +21,7 @@ from standoff.evaluation.paper.trial import Trial, build_monitor, settings_for
 from standoff.evaluation.paper.truth_detector import without_reference
 from standoff.evaluation.paper.turning import Turning
 from standoff.evaluation.rectification import FAILURE_PX
+from standoff.monitor import Run
 from standoff.stages.frames import Source, open_source
 from standoff.stages.ground import ReferenceShape
 
@@ -120,7 +121,7 @@ def watch(clip: Clip, trial: Trial, on_frame: Callable[[], None] | None = None) 
         reference = settings_for(clip, trial).ground.reference
         assert reference is not None, "checked in settings_for"
         notes = Notes(clip, reference.shape(), source.size_px, true_ids=not isinstance(trial.detector, Path))
-        with closing(monitor.run()) as results:
+        with closing(iter(Run(source, monitor))) as results:
             for result in results:
                 check_frame(clip, result.frame.index)
                 notes.take(result)

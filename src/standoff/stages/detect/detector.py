@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 import onnxruntime
 
+from standoff.core import protocols
 from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.finding import KEY
 from standoff.core.homography import BoolArray, FloatArray
@@ -34,7 +35,7 @@ _COARSE_IOU: Final = 0.2
 scaled-down PETS frames with yolo-fastest at 960x544, 2x2 slices: from precision 0.72 to 0.78 at recall 0.65."""
 
 
-class OnnxDetector:
+class OnnxDetector(protocols.Detector):
     """Detector that reads everything it must know from the model's file, or from the description beside it.
 
     Args:

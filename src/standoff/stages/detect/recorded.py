@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from standoff.clips import RecordedDetections, read_detections
+from standoff.core import protocols
 from standoff.core.errors import DataError
 from standoff.core.types import Detections, Frame
 from standoff.stages.detect.model_card import file_sha256
@@ -16,7 +17,7 @@ _SAME_TIME_S: Final = 1e-6
 _FIX: Final = "choose --start, --stop and --every as in that run, or record the whole source"
 
 
-class RecordedDetector:
+class RecordedDetector(protocols.Detector):
     """Detector that replays the detections of an earlier run of the same source, frame by frame.
 
     Args:
@@ -58,13 +59,26 @@ class RecordedDetector:
         Args:
             description: As the source describes itself.
         """
-        width_px, height_px = description["size_px"]
-        self._check_size((width_px, height_px))
         before, now = self._recorded.source.get("fingerprint"), description.get("fingerprint")
         if before is not None and now is not None and before != now:
             raise DataError(
                 expected=f"the source of the detections in {self._recorded.path} ({self._source_name()})",
                 found=f"{description.get('name', 'a source')} with other content",
+                fix="give the run of this source, or detect anew",
+            )
+
+    def prepare(self, size_px: tuple[int, int]) -> None:
+        """Make sure that pictures of this (width, height) were recorded.
+
+        Raises:
+            DataError: They had another size.
+        """
+        if size_px != self._recorded.size_px:
+            raise DataError(
+                expected="pictures of {}x{} as in {} ({})".format(
+                    *self._recorded.size_px, self._recorded.path, self._source_name()
+                ),
+                found="{}x{}".format(*size_px),
                 fix="give the run of this source, or detect anew",
             )
 
@@ -92,7 +106,7 @@ class RecordedDetector:
         return self._recorded.detections_at(row)
 
     def _row(self, frame: Frame) -> int:
-        self._check_size(frame.size_px)
+        self.prepare(frame.size_px)
         row = self._recorded.row_of(frame.index)
         if row is None:
             raise DataError(
@@ -109,16 +123,6 @@ class RecordedDetector:
                 fix="give the run of this source (with the same --fps), or detect anew",
             )
         return row
-
-    def _check_size(self, size_px: tuple[int, int]) -> None:
-        if size_px != self._recorded.size_px:
-            raise DataError(
-                expected="pictures of {}x{} as in {} ({})".format(
-                    *self._recorded.size_px, self._recorded.path, self._source_name()
-                ),
-                found="{}x{}".format(*size_px),
-                fix="give the run of this source, or detect anew",
-            )
 
     def _source_name(self) -> str:
         return str(self._recorded.source.get("name", "a source without a name"))

@@ -18,6 +18,7 @@ from types import TracebackType
 from typing import Any, Self
 from urllib.parse import unquote
 
+from standoff.core import protocols
 from standoff.core.camera import CameraPrior
 from standoff.core.errors import SourceError
 from standoff.core.types import Frame, ImageArray
@@ -33,7 +34,7 @@ _ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:/")
 _FILE_ADDRESS = re.compile(r"file:/*(?:/localhost)?/(?P<path>.*)", re.IGNORECASE)
 
 
-class Source:
+class Source(protocols.Source):
     """An opened source; iterate over it once.
 
     Args:
@@ -44,9 +45,6 @@ class Source:
 
     Attributes:
         stream_id: Name of the stream.
-        size_px: (width, height) of every frame, upright.
-        frame_count: How many frames it should yield: exact for an image folder and at a constant frame
-            rate, an estimate at a variable one; None when the source does not tell.
 
     Raises:
         SourceError: The part that is wanted holds no picture.
@@ -57,11 +55,19 @@ class Source:
     ) -> None:
         self.stream_id = stream_id
         self._telemetry = TelemetryChoice() if telemetry is None else telemetry
-        self.size_px = reader.size_px
-        self.frame_count = selection.expected_of(reader.total_frames, reader.rate_fps)
         self._reader = reader
         self._selection = selection
         self._shots = self._wanted_shots()
+
+    @property
+    def size_px(self) -> tuple[int, int]:
+        """(width, height) of every frame, upright."""
+        return self._reader.size_px
+
+    @property
+    def frame_count(self) -> int | None:
+        """How many frames it should yield: exact for an image folder and at a constant frame rate, else an estimate."""
+        return self._selection.expected_of(self._reader.total_frames, self._reader.rate_fps)
 
     def _wanted_shots(self) -> Iterator[Shot]:
         shots = self._reader.shots(self._selection)
@@ -83,7 +89,10 @@ class Source:
         return f"it lasts about {total / rate:.1f} s" if total and rate else "its length is not declared"
 
     def __iter__(self) -> Iterator[Frame]:
-        """Yield frames.
+        return self.frames()
+
+    def frames(self) -> Iterator[Frame]:
+        """Yield frames; once.
 
         Raises:
             FrameSizeChanged: A picture has another size than the first.
@@ -113,6 +122,7 @@ class Source:
         return {
             **self._reader.description,
             **self._selection._asdict(),
+            "warnings": list(self.warnings),
             "frames_expected": self.frame_count,
             "telemetry": self._telemetry.description,
             "camera": {

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from standoff.core import homography
+from standoff.core import homography, protocols
 from standoff.core.homography import FloatArray
 from standoff.core.protocols import AnyGround, AnyMotion
 from standoff.core.types import CameraMotion, Detections, Frame, GroundMap, NoGroundMap
@@ -57,7 +57,7 @@ class _Moved:
         return float(np.linalg.norm(moved_px - places_px, axis=1).max()), float(np.sqrt(variance_px2.max()))
 
 
-class FixedCamera:
+class FixedCamera(protocols.Ground):
     """Gives a survey's map while the camera stands as it was surveyed, and carries it along where it moved a little.
 
     The camera is taken to stand as surveyed in the first frame. From then on the picture's motion tells how far it
@@ -94,13 +94,13 @@ class FixedCamera:
             warnings.append("the picture shows too little to tell whether the camera still stands as it was surveyed")
         return {**self.survey.description, "warnings": warnings}
 
-    def check_size(self, size_px: tuple[int, int]) -> None:
+    def prepare(self, size_px: tuple[int, int]) -> None:
         """Make sure that pictures of a size (width, height) have the survey's shape, before the first frame.
 
         Raises:
             GroundError: They do not.
         """
-        self.survey.check_size(size_px)
+        self.survey.prepare(size_px)
 
     def update(self, frame: Frame, detections: Detections, motion: AnyMotion) -> AnyGround:
         """Return the map of the camera as it stands in a frame, or why there is none."""

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from standoff.core import homography
+from standoff.core import homography, protocols
 from standoff.core.camera import CameraPrior
 from standoff.core.homography import FloatArray
 from standoff.core.pose import CHANGES
@@ -32,7 +32,7 @@ NOT_SURE = "lengths on the ground are not sure enough"
 UNSURE = "the reference has been out of sight too long"
 
 
-class FusedGround:
+class FusedGround(protocols.Ground):
     """Follows one camera over the ground by what there is, best first.
 
     1. Surveyed points, in the picture that they were read from; reference objects and markers, of known size. The
@@ -56,7 +56,7 @@ class FusedGround:
         remember: Whether frames know of those before them; False takes each by itself.
 
     Raises:
-        GroundError: The survey has an area; camera, survey or a box does not fit the pictures (`check_size`,
+        GroundError: The survey has an area; camera, survey or a box does not fit the pictures (`prepare`,
             `update`).
     """
 
@@ -142,7 +142,7 @@ class FusedGround:
         """Relative standard error of lengths in the middle of the picture now; infinite before the first map."""
         return self._belief.length_sigma
 
-    def check_size(self, size_px: tuple[int, int]) -> None:
+    def prepare(self, size_px: tuple[int, int]) -> None:
         """Make sure that boxes and camera fit pictures of a size (width, height), before the first frame.
 
         Raises:
@@ -153,7 +153,7 @@ class FusedGround:
         for reference in self._given_references:
             reference.place.check_size(size_px)
         if self._survey is not None:
-            self._survey.survey.check_size(size_px)
+            self._survey.survey.prepare(size_px)
         camera = prior_for(self._given_camera, size_px)
         self._forget_pictures()
         self._camera, self._size_px = camera, size_px
@@ -175,7 +175,7 @@ class FusedGround:
         Raises:
             GroundError: A box or the camera does not fit the pictures.
         """
-        self.check_size(frame.size_px)
+        self.prepare(frame.size_px)
         belief, moment = self._belief, Moment(frame, detections, motion)
         if not self._remember:
             belief.restart()

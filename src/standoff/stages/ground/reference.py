@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from standoff.core import homography
+from standoff.core import homography, protocols
 from standoff.core.camera import Camera
 from standoff.core.errors import GroundError
 from standoff.core.homography import FloatArray
@@ -33,7 +33,7 @@ _LOOSE = 2.0
 """Corners before their refinement may be twice as far off."""
 
 
-class ReferenceGround:
+class ReferenceGround(protocols.Ground):
     """Finds the reference object in each frame and maps the picture to metres with it.
 
     Where to look comes from the detector's `reference` class, or from a box given for one frame; on frames without
@@ -72,13 +72,17 @@ class ReferenceGround:
         self._camera = camera
         self._size_px: tuple[int, int] | None = None
         self._finder: OutlineFinder | None = None
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the stream."""
         self._follower = BoxFollower()
         self._box: FloatArray | None = None
         self._corners: FloatArray | None = None
         self._hint = self._given.first_corner_px
         self._known_s = -np.inf
         self._outlined = False
-        self._corners_told = len(shape.turns_onto_itself()) == 1 or self._hint is not None
+        self._corners_told = len(self._shape.turns_onto_itself()) == 1 or self._hint is not None
 
     @property
     def description(self) -> dict[str, Any]:
@@ -125,7 +129,7 @@ class ReferenceGround:
             return turn
         return self._accept(outline, turn, frame, gray)
 
-    def check_size(self, size_px: tuple[int, int]) -> None:
+    def prepare(self, size_px: tuple[int, int]) -> None:
         """Make sure that box and camera fit pictures of a size (width, height), before the first frame.
 
         Raises:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from standoff.core import protocols
 from standoff.core.camera import CameraPrior
 from standoff.core.classes import Role, class_ids
 from standoff.core.errors import GroundError
@@ -60,7 +61,7 @@ class _Sizes:
         return nearest if abs(float(np.median(self.logs))) > 2.0 * self.sigma else 0.0
 
 
-class ScaleWatch:
+class ScaleWatch(protocols.Ground):
     """A ground stage around another one, which is told when its metres cannot be.
 
     Sizes off by a factor of 1.6 are a warning; by a factor of 4 there is no map. Both need sizes of several people or
@@ -76,6 +77,9 @@ class ScaleWatch:
     def __init__(self, inner: Ground, camera: CameraPrior | None = None) -> None:
         self.inner = inner
         self._camera = camera
+        self._forget()
+
+    def _forget(self) -> None:
         self._sizes = {name: _Sizes(deque(maxlen=_MOST_SIZES), deque(maxlen=_MOST_SIZES)) for name in _GROUPS}
         self._sampled_s = -np.inf
         self._refusal = ""
@@ -85,21 +89,24 @@ class ScaleWatch:
     @property
     def description(self) -> dict[str, Any]:
         """The inner stage's, and what is odd about its lens and, by the sizes of what is seen, about its metres."""
-        inner = dict(getattr(self.inner, "description", {}))
+        inner = dict(self.inner.description)
         inner["warnings"] = [*lens_warnings(self._camera), *inner.get("warnings", ()), *self._warnings()]
         seen = {name: len(sizes.logs) for name, sizes in self._sizes.items() if sizes.logs}
         ratios = {name: float(np.exp(np.median(sizes.logs))) for name, sizes in self._sizes.items() if sizes.logs}
         return {**inner, "scale_watch": {"sizes_seen": seen, "times_too_large": ratios}}
 
-    def check_size(self, size_px: tuple[int, int]) -> None:
+    def prepare(self, size_px: tuple[int, int]) -> None:
         """Make sure that the inner stage fits pictures of a size (width, height), before the first frame.
 
         Raises:
             GroundError: It does not.
         """
-        check = getattr(self.inner, "check_size", None)
-        if check is not None:
-            check(size_px)
+        self.inner.prepare(size_px)
+
+    def reset(self) -> None:
+        """Forget the stream, the inner stage's part of it as well."""
+        self.inner.reset()
+        self._forget()
 
     def update(self, frame: Frame, detections: Detections, motion: AnyMotion) -> AnyGround:
         """Return the inner stage's map, unless sizes say that its metres are none."""

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from standoff.core import homography
+from standoff.core import homography, protocols
 from standoff.core.camera import Camera
 from standoff.core.errors import GroundError
 from standoff.core.geographic import GeographicOrigin
@@ -22,7 +22,7 @@ _SUSPICIOUS_SCORE = 3.3
 _STEPS_PER_SIDE = 16
 
 
-class SurveyedGround:
+class SurveyedGround(protocols.Ground):
     """Give the same map for every frame of a camera that does not move.
 
     The map minimises the distances in the picture between the points, freed from lens distortion, and the
@@ -95,7 +95,12 @@ class SurveyedGround:
         )
         self._current: GroundMap | NoGroundMap = self._surveyed
         self._current_size_px = image_size_px
-        self.description = _describe(self.fit, self._surveyed, names, point_sigma_px)
+        self._description = _describe(self.fit, self._surveyed, names, point_sigma_px)
+
+    @property
+    def description(self) -> dict[str, Any]:
+        """What the fit says of points and map, for the record."""
+        return self._description
 
     @property
     def is_mirrored(self) -> bool:
@@ -120,7 +125,7 @@ class SurveyedGround:
         """
         return self._in(size_px).anchors_px, self.fit.sigma_px * size_px[0] / self._surveyed.image_size_px[0]
 
-    def check_size(self, size_px: tuple[int, int]) -> None:
+    def prepare(self, size_px: tuple[int, int]) -> None:
         """Make sure that pictures of a size (width, height) have the survey's shape, before the first frame.
 
         Raises:

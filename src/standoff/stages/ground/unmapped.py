@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from standoff.core import protocols
 from standoff.core.types import CameraMotion, Detections, Frame, NoCameraMotion, NoGroundMap
 from standoff.stages.ground.basis import HELP
 
 
-class Unmapped:
+class Unmapped(protocols.Ground):
     """Say in every frame that no ground is configured."""
 
-    def __init__(self) -> None:
-        self.description = {"method": "none", "basis": "nothing: no ground is configured", "better": HELP}
+    @property
+    def description(self) -> dict[str, str]:
+        """That there is nothing, and what would help."""
+        return {"method": "none", "basis": "nothing: no ground is configured", "better": HELP}
 
     def update(self, frame: Frame, detections: Detections, motion: CameraMotion | NoCameraMotion) -> NoGroundMap:
         """Return the reason; frame, detections and motion play no part."""

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Literal
 
 from ulid import ULID
 
 from standoff.core.types import Hazard, Phase, Severity
+
+LastPhase = Literal["closed", "unknown"]
+"""With what a hazard ends: it is over, or its stream was lost."""
 
 NOT_MEASURED = "not measured"
 TRACK_LOST = "track lost"
@@ -157,9 +161,9 @@ class StreamHazard:
         self._hazard = OpenHazard(self._rule, (), "unknown")
         return self._hazard.event("opened", time_s, reason=reason)
 
-    def end(self, time_s: float, reason: str) -> Hazard | None:
-        """Close the hazard, if one is open."""
+    def end(self, time_s: float, reason: str, phase: LastPhase = "closed") -> Hazard | None:
+        """End the hazard, if one is open: over, or unknown because nobody watches any more."""
         if self._hazard is None:
             return None
-        closing, self._hazard = self._hazard, None
-        return closing.event("closed", time_s, reason=reason)
+        ending, self._hazard = self._hazard, None
+        return ending.event(phase, time_s, reason=reason)

@@ -6,13 +6,14 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+from standoff.core import protocols
 from standoff.core.homography import BoolArray
 from standoff.core.types import GroundMap, GroundPositions, Hazard, NoGroundMap, Proximities, WatchedGround
 from standoff.core.zones import Zone
 from standoff.stages.hazard.absence import AbsenceWatch
 from standoff.stages.hazard.follow import FollowWatch
 from standoff.stages.hazard.levels import levels_of
-from standoff.stages.hazard.life import NOT_MEASURED, NOT_WATCHED, TRACK_LOST, Reading
+from standoff.stages.hazard.life import NOT_MEASURED, NOT_WATCHED, TRACK_LOST, LastPhase, Reading
 from standoff.stages.hazard.load import AlarmLoad
 from standoff.stages.hazard.params import HazardParams
 from standoff.stages.hazard.watch import Watch
@@ -28,7 +29,7 @@ WATCHED_AGAIN = "ground is watched again"
 _NOBODY_JUDGED = WatchedGround()
 
 
-class HazardMonitor:
+class HazardMonitor(protocols.HazardMonitor):
     """Raise, follow and close the hazards of one stream.
 
     A hazard's first event is "opened", its last "closed", and nothing follows that. An event carries the
@@ -108,12 +109,19 @@ class HazardMonitor:
 
     def close(self, time_s: float) -> tuple[Hazard, ...]:
         """End the stream: close everything that is open."""
-        events = [one.end(time_s, STREAM_ENDED) for one in (self._map, self._follow, self._sight)]
+        return self._end(time_s, STREAM_ENDED, "closed")
+
+    def lose(self, time_s: float, reason: str) -> tuple[Hazard, ...]:
+        """End a stream that was lost: what is open is unknown from now on, and nobody says that it is over."""
+        return self._end(time_s, reason, "unknown")
+
+    def _end(self, time_s: float, reason: str, phase: LastPhase) -> tuple[Hazard, ...]:
+        events = [one.end(time_s, reason, phase) for one in (self._map, self._follow, self._sight)]
         for pair in sorted(self._pairs):
-            events += [self._pairs[pair].finish(time_s), self._pairs[pair].end(time_s, STREAM_ENDED)]
+            events += [self._pairs[pair].finish(time_s), self._pairs[pair].end(time_s, reason, phase)]
         self._map, self._pairs = AbsenceWatch(self._params, MAP_IS_BACK), {}
         self._sight = AbsenceWatch(self._params, WATCHED_AGAIN)
-        return _said(events + self._zones.end(time_s, STREAM_ENDED))
+        return _said(events + self._zones.end(time_s, reason, phase))
 
     def _unseeing(self, watched: WatchedGround) -> str:
         """Return why a worker would hardly be found anywhere; "" where there is ground enough that is watched."""

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from standoff.core.types import Hazard, Severity
-from standoff.stages.hazard.life import UNMEASURED, Latch, OpenHazard, Reading
+from standoff.stages.hazard.life import UNMEASURED, LastPhase, Latch, OpenHazard, Reading
 from standoff.stages.hazard.params import HazardParams
 
 
@@ -136,12 +136,12 @@ class Watch:
         self._breached.finish()
         return self._open(time_s, self._severity(clear=False))
 
-    def end(self, time_s: float, reason: str) -> Hazard | None:
-        """Close the hazard, if one is open."""
+    def end(self, time_s: float, reason: str, phase: LastPhase = "closed") -> Hazard | None:
+        """End the hazard, if one is open: over, as it was last measured, or unknown because nobody watches any more."""
         if self._hazard is None:
             return None
-        closing, self._hazard = self._hazard, None
-        return closing.event("closed", time_s, self._reading, reason)
+        ending, self._hazard = self._hazard, None
+        return ending.event(phase, time_s, self._reading if phase == "closed" else UNMEASURED, reason)
 
     def _open(self, time_s: float, severity: Severity, reason: str = "") -> Hazard:
         self._hazard = OpenHazard(self._rule, self._track_ids, severity, self._zone)

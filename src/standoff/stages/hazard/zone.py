@@ -14,7 +14,7 @@ from standoff.core.types import GroundMap, GroundPositions, Hazard, NoGroundMap
 from standoff.core.zones import NOT_PLACED, Zone
 from standoff.stages.hazard.absence import AbsenceWatch
 from standoff.stages.hazard.inside import probability_inside
-from standoff.stages.hazard.life import NOT_MEASURED, NOT_WATCHED, TRACK_LOST, UNMEASURED, Reading
+from standoff.stages.hazard.life import NOT_MEASURED, NOT_WATCHED, TRACK_LOST, UNMEASURED, LastPhase, Reading
 from standoff.stages.hazard.params import HazardParams
 from standoff.stages.hazard.watch import Limit, Watch
 
@@ -121,11 +121,11 @@ class ZoneRule:
         self._forget_idle(alive)
         return events
 
-    def end(self, time_s: float, reason: str) -> list[Hazard | None]:
-        """Close everything that is open, and forget it."""
-        events = [self._unplaced.end(time_s, reason)]
+    def end(self, time_s: float, reason: str, phase: LastPhase = "closed") -> list[Hazard | None]:
+        """End everything that is open, and forget it."""
+        events = [self._unplaced.end(time_s, reason, phase)]
         for key in sorted(self._watches):
-            events += [self._watches[key].finish(time_s), self._watches[key].end(time_s, reason)]
+            events += [self._watches[key].finish(time_s), self._watches[key].end(time_s, reason, phase)]
         self._unplaced, self._watches, self._last = AbsenceWatch(self._params, PLACED, "zone"), {}, {}
         return events
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from standoff.core import homography
+from standoff.core import homography, protocols
 from standoff.core.classes import CLASSES
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.map_error import factor, map_jacobian
@@ -50,7 +50,7 @@ class _Measured(NamedTuple):
     reason: TextArray
 
 
-class Locator:
+class Locator(protocols.Locator):
     """Place each track of one stream on the ground.
 
     One point stands for the entity and is taken to lie on the ground plane: the detector's own ground point, whose

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from standoff.core import homography
+from standoff.core import homography, protocols
 from standoff.core.camera import Camera
 from standoff.core.errors import GroundError
 from standoff.core.homography import FloatArray
@@ -39,7 +39,7 @@ _LONGEST_STEP = 3.0
 """Times the last step that a gap may be filled with: beyond that it is a guess, and a look around is better."""
 
 
-class MotionEstimator:
+class MotionEstimator(protocols.CameraMotionEstimator):
     """Follow the picture of the ground from a fixed keyframe, and say why where that fails.
 
     Points spread over the picture are followed by Lucas-Kanade from the keyframe itself, not from frame to frame, so

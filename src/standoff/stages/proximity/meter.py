@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from standoff.core import protocols
 from standoff.core.classes import CLASS_BY_NAME, CLASSES, Role
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import GroundMap, GroundPositions, IntArray, NoGroundMap, Proximities
@@ -17,7 +18,7 @@ from standoff.stages.proximity.prediction import predict
 Pair = tuple[int, int]
 
 
-class ProximityMeter:
+class ProximityMeter(protocols.ProximityMeter):
     """Measure the pairs of tracks of one stream.
 
     Distances are measured on the ground plane, centre to centre. In the paper's words that is Eq. 6:

@@ -1,33 +1,32 @@
 """Results become files: tables, events, an annotated video, a report and a record of the run."""
 
-from standoff.stages.sinks.folder import OUTPUT_FILES, prepare_output
+from standoff.core.watched_shares import percent_text
+from standoff.stages.sinks.folder import prepare_output
 from standoff.stages.sinks.hazards import HazardSink
+from standoff.stages.sinks.make import Wanted, make_sink
 from standoff.stages.sinks.params import DrawParams, ReportParams, ShowParams, TableParams, VideoParams
-from standoff.stages.sinks.record import RecordSink
 from standoff.stages.sinks.report import ReportSink
 from standoff.stages.sinks.tables import (
     DETECTIONS,
     FRAMES,
     PROXIMITY,
     TRACKS,
+    ZONED_TRACKS,
     Table,
     TableSink,
     detections_table,
-    tracks_table,
 )
 from standoff.stages.sinks.video import Composer, VideoSink
-from standoff.stages.sinks.watched_shares import percent_text
 
 __all__ = [
     "DETECTIONS",
     "FRAMES",
-    "OUTPUT_FILES",
     "PROXIMITY",
     "TRACKS",
+    "ZONED_TRACKS",
     "Composer",
     "DrawParams",
     "HazardSink",
-    "RecordSink",
     "ReportParams",
     "ReportSink",
     "ShowParams",
@@ -36,8 +35,9 @@ __all__ = [
     "TableSink",
     "VideoParams",
     "VideoSink",
+    "Wanted",
     "detections_table",
+    "make_sink",
     "percent_text",
     "prepare_output",
-    "tracks_table",
 ]

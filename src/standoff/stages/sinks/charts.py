@@ -166,9 +166,7 @@ def pair_charts(summary: RunSummary, warning_gap_m: float) -> str:
 
 
 def watched_chart(summary: RunSummary) -> str:
-    """Draw which share of the ground was watched over time; empty when nobody judged."""
-    if not summary.watched.frames:
-        return ""
+    """Draw which share of the ground was watched over time."""
     with themed_figure(10.0, 1.6) as figure:
         axes = figure.add_subplot()
         time_s, percent = summary.watched_share.column("time_s"), 100.0 * summary.watched_share.column("gap_m")

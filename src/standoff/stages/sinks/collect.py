@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
+from standoff.core.hazards import Pair, worse
 from standoff.core.lengths import UNITS
 from standoff.core.types import Frame, FrameResult, GroundMap, Hazard, ImageArray, NoGroundMap, Severity
 from standoff.core.zones import Zone
 from standoff.stages.sinks.blurring import PeopleWatch, blur
 from standoff.stages.sinks.moments import WorstMoments
 from standoff.stages.sinks.params import ReportParams, ShowParams
-from standoff.stages.sinks.scene import OpenHazards, Pair, Scene, worse
+from standoff.stages.sinks.scene import Scene
 from standoff.stages.sinks.series import Path, Series
-from standoff.stages.sinks.watched_shares import WatchedShares
 
 _MOST_HAZARDS = 5000
 _MOST_PATHS = 150
@@ -70,7 +69,7 @@ class HazardLife:
 
 
 class RunSummary:
-    """Gather counts, curves, paths, hazards and worst moments.
+    """Gather curves, paths, hazards and worst moments.
 
     Args:
         params: How much of each is kept.
@@ -83,16 +82,11 @@ class RunSummary:
         self.zones, self.unit, self.is_blurred = zones, UNITS[show.unit], show.blur
         self._people = PeopleWatch(wanted=show.blur)
         self._most_pairs = params.pairs
-        self._open = OpenHazards()
-        self._live_tracks: set[int] = set()
-        self.counts: Counter[str] = Counter()
-        self.no_map_reasons: Counter[str] = Counter()
-        self.invalid_reasons: Counter[str] = Counter()
-        self.map_methods: Counter[str] = Counter()
+        self.mapped_frames = self.placed_frames = 0
+        self.hazards_left_out = 0
         self.moments = WorstMoments(params.moments, params.moment_width_px)
         self.site = Series()
         self.no_map = Series()
-        self.watched = WatchedShares()
         self.watched_share = Series()
         self.pairs: dict[Pair, Series] = {}
         self.pair_names: dict[Pair, tuple[str, str]] = {}
@@ -106,14 +100,11 @@ class RunSummary:
     def add(self, result: FrameResult) -> None:
         """Take one frame."""
         frame, pairs = result.frame, result.proximities
-        if not self.counts["frames"]:
+        if not self.stream_id:
             self.first_s, self.stream_id, self.size_px = frame.time_s, frame.stream_id, frame.size_px
         self.last_s = frame.time_s
-        self._open.update(result.hazards)
-        scene = Scene.of(result, self._open, self.zones, self._people.update(result))
-        self._count(result)
+        scene = Scene.of(result, self.zones, self._people.update(result))
         self._add_ground(frame, scene)
-        self.watched.add(result.watched)
         # Of frames that share a sample the one with the least share is kept, as is the closest of a pair.
         self.watched_share.add(frame.time_s, result.watched.share, float("nan"), float("nan"))
         self._add_paths(scene)
@@ -127,30 +118,13 @@ class RunSummary:
         else:
             self.site.add(frame.time_s, float("nan"), float("nan"), float("nan"))
 
-    def _count(self, result: FrameResult) -> None:
-        tracks = set(result.tracks.track_id.tolist())
-        pairs = result.proximities
-        self.counts.update(
-            frames=1,
-            detected_frames=int(result.detected),
-            tracks=len(tracks - self._live_tracks),
-            distances=len(pairs),
-            measured_distances=int(np.isfinite(pairs.distance_m).sum()),
-            filtered_distances=int(pairs.filtered.sum()),
-            positions=len(result.positions),
-            valid_positions=int(result.positions.valid.sum()),
-        )
-        self.invalid_reasons.update(result.positions.reason[~result.positions.valid].tolist())
-        self._live_tracks = tracks
-
     def _add_ground(self, frame: Frame, scene: Scene) -> None:
         ground = scene.ground
         if isinstance(ground, NoGroundMap):
-            self.no_map_reasons[ground.reason] += 1
             self.no_map.add(frame.time_s, float("nan"), float("nan"), float("nan"))
             return
-        self.map_methods[ground.method] += 1
-        self.counts["frames_with_zones"] += int(ground.frame_stated)
+        self.mapped_frames += 1
+        self.placed_frames += int(ground.frame_stated)
         self.no_map.add(frame.time_s, 0.0, 0.0, 0.0)
         if self.background is None:
             width = min(_BACKGROUND_WIDTH_PX, frame.size_px[0])
@@ -224,8 +198,7 @@ class RunSummary:
     @property
     def placed_zones(self) -> tuple[Zone, ...]:
         """The zones, where all paths on the ground can be compared with them."""
-        mapped = sum(self.map_methods.values())
-        return self.zones if 0 < mapped == self.counts["frames_with_zones"] else ()
+        return self.zones if 0 < self.mapped_frames == self.placed_frames else ()
 
     def of_zone(self, zone: Zone) -> list[HazardLife]:
         """Return the hazards of a zone."""
@@ -235,7 +208,7 @@ class RunSummary:
         """Take an event of a known hazard."""
         life = self.hazards.get(event.hazard_id)
         if life is None:
-            self.counts["hazards_left_out"] += int(event.phase == "opened")
+            self.hazards_left_out += int(event.phase == "opened")
             return
         life.severity = worse(life.severity, event.severity)
         life.measure(event.distance_m, event.gap_m, event.sigma_m)

@@ -1,4 +1,4 @@
-"""The output folder: which files are ours, and whether it can be used."""
+"""The output folder: whether it can be used."""
 
 from __future__ import annotations
 
@@ -8,21 +8,9 @@ import tempfile
 from pathlib import Path
 
 from standoff.core.errors import OutputError
+from standoff.core.outputs import RUN_FILES
 from standoff.files.in_use import in_use
 from standoff.files.place import partial_path
-
-OUTPUT_FILES: tuple[str, ...] = (
-    "run.json",
-    "tracks.parquet",
-    "proximity.parquet",
-    "frames.parquet",
-    "detections.parquet",
-    "hazards.jsonl",
-    "zones.geojson",
-    "annotated.mp4",
-    "report.html",
-)
-"""Every file that a run can write, by its final name."""
 
 
 def parts_folder(path: Path) -> Path:
@@ -35,7 +23,7 @@ def parts_folder(path: Path) -> Path:
 
 
 def _traces(folder: Path) -> list[Path]:
-    finals = [folder / name for name in OUTPUT_FILES]
+    finals = [folder / name for name in RUN_FILES]
     unfinished = [parts_folder(path) for path in finals if path.suffix == ".parquet"]
     unfinished += [partial_path(path) for path in finals]
     return [path for path in finals + unfinished if path.exists() or path.is_symlink()]

@@ -7,13 +7,14 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from standoff.core.hazards import Pair
 from standoff.core.homography import FloatArray
 from standoff.core.lengths import LengthUnit
 from standoff.core.types import Frame, ImageArray
 from standoff.stages.sinks.blurring import blur
 from standoff.stages.sinks.drawing import Overlay
 from standoff.stages.sinks.params import DrawParams
-from standoff.stages.sinks.scene import Pair, Scene
+from standoff.stages.sinks.scene import Scene
 from standoff.stages.sinks.sketch import Sketch
 
 _CLOSER_BY_M = 0.1

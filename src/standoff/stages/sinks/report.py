@@ -34,11 +34,8 @@ class ReportSink:
     Args:
         path: The file, usually `report.html`.
         params: How much is kept.
-        descriptions: What only the caller knows, by heading ("source", "model", "ground", "configuration"),
-            shown as given.
         warning_gap_m: Gap (distance less both action radii) below which the hazard stage warns, to be drawn;
             below 0 the circles touch, which is danger.
-        at_close: Gives those descriptions anew that are only known after the last frame; None: nothing is.
         checked: Gives after the last frame what the page says, in HTML, of how true the stated errors are, where truth
             is known; None or an empty text: they were not checked, and the page says so.
         zones: Of the site.
@@ -49,18 +46,14 @@ class ReportSink:
         self,
         path: Path | str,
         params: ReportParams | None = None,
-        descriptions: Mapping[str, Any] | None = None,
         *,
         warning_gap_m: float = 1.0,
-        at_close: Callable[[], Mapping[str, Any]] | None = None,
         checked: Callable[[], str] | None = None,
         zones: tuple[Zone, ...] = (),
         show: ShowParams | None = None,
     ) -> None:
         self._checked = checked
-        self._at_close = at_close
         self._path, self._warning_gap_m = Path(path), warning_gap_m
-        self._descriptions = dict(descriptions or {})
         self._summary = RunSummary(params or ReportParams(), zones, show)
 
     def write(self, result: FrameResult) -> None:
@@ -71,17 +64,13 @@ class ReportSink:
         """Write the page; its name appears when it is whole."""
         for event in outcome.hazards:
             self._summary.take_event(event)
-        if self._at_close is not None:
-            self._descriptions |= self._at_close()
         checked = "" if self._checked is None else self._checked()
-        page = render(self._summary, outcome, self._descriptions, self._warning_gap_m, checked)
+        page = render(self._summary, outcome, self._warning_gap_m, checked)
         with partial_file(self._path) as partial:
             partial.write_text(page, encoding="utf-8")
 
 
-def render(
-    summary: RunSummary, outcome: Outcome, descriptions: Mapping[str, Any], warning_gap_m: float, checked: str
-) -> str:
+def render(summary: RunSummary, outcome: Outcome, warning_gap_m: float, checked: str) -> str:
     """Return the page."""
     # matplotlib takes long to load; a run starts without it, and whoever imports another sink does not need it
     from standoff.stages.sinks.charts import clock, pair_charts, plan_chart, site_chart, watched_chart
@@ -90,7 +79,8 @@ def render(
     environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True)
     environment.filters.update(clock=clock, percent=_percent, length=summary.unit.length, said=summary.unit.said)
     template = environment.from_string((folder / "report.html.j2").read_text(encoding="utf-8"))
-    has_frames = summary.counts["frames"] > 0
+    about, counts = outcome.about, outcome.counts
+    has_frames = counts.rows["frames"] > 0
     hazards = sorted(summary.hazards.values(), key=_gravest_first)
     shown = summary.moments.worth_showing(warning_gap_m + _MOMENT_MARGIN_M)
     return template.render(
@@ -99,24 +89,25 @@ def render(
         css=Markup((folder / "report.css").read_text(encoding="utf-8")),
         outcome=outcome,
         run=summary,
+        counts=counts,
         warning_gap_m=warning_gap_m,
-        unmeasured_frames=sum(summary.no_map_reasons.values()),
+        unmeasured_frames=counts.no_map.total(),
         closest=summary.site.closest,
         hazards=hazards[:_MOST_ROWS],
-        hazards_left_out=max(0, len(hazards) - _MOST_ROWS) + summary.counts["hazards_left_out"],
+        hazards_left_out=max(0, len(hazards) - _MOST_ROWS) + summary.hazards_left_out,
         severities=Counter(hazard.severity for hazard in hazards),
         site_chart=Markup(site_chart(summary, warning_gap_m)) if has_frames else "",
-        watched_chart=Markup(watched_chart(summary)),
-        guessed=(descriptions.get("watched") or {}).get("measured") is False,
+        watched_chart=Markup(watched_chart(summary)) if counts.watched.frames else "",
+        guessed=(about.get("watched") or {}).get("measured") is False,
         pair_charts=Markup(pair_charts(summary, warning_gap_m)),
         plan_chart=Markup(plan_chart(summary)),
         zones=[_zone_row(zone, summary) for zone in summary.zones],
         unplaced=NOT_PLACED,
         moments=[(moment, _data_uri(moment.jpeg(summary.unit))) for moment in shown],
-        warnings=descriptions.get("warnings", ()),
-        basis=(ground := descriptions.get("ground") or {}).get("basis", ""),
+        warnings=about.get("warnings", ()),
+        basis=(ground := about.get("ground") or {}).get("basis", ""),
         better=ground.get("better", ""),
-        descriptions={heading: list(_flat(plain(value))) for heading, value in descriptions.items() if value},
+        descriptions={heading: list(_flat(plain(value))) for heading, value in about.items() if value},
         assistance=ASSISTANCE,
         checked=Markup(checked),
     )

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from standoff.core.classes import CLASSES
+from standoff.core.hazards import GRAVENESS, Pair, worse
 from standoff.core.homography import FloatArray
 from standoff.core.types import (
     FrameResult,
@@ -20,45 +21,14 @@ from standoff.core.types import (
     Tracks,
     WatchedGround,
 )
+from standoff.core.watched_shares import around_tracks, percent_text
 from standoff.core.zones import Zone
 from standoff.stages.sinks.palette import Tone, class_tone
-from standoff.stages.sinks.watched_shares import around_tracks, percent_text
 
-Pair = tuple[int, int]
-
-_GRAVENESS: tuple[Severity, ...] = ("unknown", "warning", "danger")
 _WELL_WATCHED = 0.9
 """From this share on nothing is said of the circle about a machine."""
 _WORTH_SAYING = 0.05
 _MOST_REASONS = 2
-
-
-class OpenHazards:
-    """The hazards that are open now, gathered from their events."""
-
-    def __init__(self) -> None:
-        self._open: dict[str, Hazard] = {}
-
-    def update(self, events: Iterable[Hazard]) -> None:
-        """Take a frame's events."""
-        for event in events:
-            if event.phase == "closed":
-                self._open.pop(event.hazard_id, None)
-            else:
-                self._open[event.hazard_id] = event
-
-    def by_pair(self) -> dict[Pair, Hazard]:
-        """Return the open hazard of each pair of tracks that are too near to each other."""
-        pairs = (e for e in self._open.values() if len(e.track_ids) == 2 and not e.zone)
-        return {(e.track_ids[0], e.track_ids[1]): e for e in pairs}
-
-    def in_zones(self) -> tuple[Hazard, ...]:
-        """Return the open hazards of zones."""
-        return tuple(e for e in self._open.values() if e.zone)
-
-    def of_stream(self) -> tuple[Hazard, ...]:
-        """Return the open hazards of the stream as a whole, which cannot be measured."""
-        return tuple(e for e in self._open.values() if e.rule == "measurement")
 
 
 ASSISTANCE = "Assistance only: no certified safety function, no replacement for a banksman or an exclusion zone"
@@ -102,7 +72,6 @@ class Scene:
     def of(
         cls,
         result: FrameResult,
-        open_hazards: OpenHazards,
         zones: tuple[Zone, ...] = (),
         hidden_px: FloatArray | None = None,
     ) -> Scene:
@@ -115,12 +84,12 @@ class Scene:
             tracks=result.tracks,
             positions=result.positions,
             proximities=result.proximities,
-            hazards=open_hazards.by_pair(),
+            hazards=result.open_hazards.by_pair(),
             zones=zones,
-            zone_hazards=open_hazards.in_zones() if zones else (),
+            zone_hazards=result.open_hazards.in_zones() if zones else (),
             hidden_px=np.zeros((0, 4)) if hidden_px is None else hidden_px,
             watched=result.watched,
-            stream_hazards=open_hazards.of_stream(),
+            stream_hazards=result.open_hazards.of_stream(),
         )
 
     @property
@@ -131,7 +100,7 @@ class Scene:
     def zone_tone(self, zone: Zone) -> Tone:
         """Return the colour of a zone: of its gravest open hazard, else that of zones."""
         severities: list[Severity] = [hazard.severity for hazard in self.zone_hazards if hazard.zone == zone.name]
-        return max(severities, key=_GRAVENESS.index) if severities else "zone"
+        return max(severities, key=GRAVENESS.index) if severities else "zone"
 
     def zone_words(self) -> dict[int, str]:
         """Return what is wrong with each track that has a hazard in a zone: "in pit", "near gate", "perhaps in pit"."""
@@ -213,12 +182,3 @@ def track_name(track_id: int, class_id: int) -> str:
     'wheel loader 4'
     """
     return f"{CLASSES[class_id].name.replace('_', ' ')} {track_id}"
-
-
-def worse(severity: Severity, other: Severity) -> Severity:
-    """Return the graver of two severities; "unknown" is what a hazard is called until it is measured.
-
-    >>> worse("warning", "danger")
-    'danger'
-    """
-    return max(severity, other, key=_GRAVENESS.index)

@@ -19,11 +19,10 @@ from standoff.clips import COLUMNS, FOOT_COLUMNS, metadata_of
 from standoff.core.classes import CLASSES
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import FrameResult, GroundMap, IntArray, NoGroundMap, Outcome, TextArray, WatchedGround
+from standoff.core.watched_shares import around_tracks
 from standoff.files.json_text import plain
 from standoff.stages.sinks.params import TableParams
 from standoff.stages.sinks.parquet_parts import Columns, ParquetParts
-from standoff.stages.sinks.scene import OpenHazards
-from standoff.stages.sinks.watched_shares import around_tracks
 
 _CLASS = pa.dictionary(pa.int32(), pa.string())
 _NAMES: TextArray = np.array([site_class.name for site_class in CLASSES], dtype=object)
@@ -287,22 +286,17 @@ def detections_table(source: Mapping[str, Any], detector: Mapping[str, Any] | No
     return Table(schema.with_metadata({**(schema.metadata or {}), **about}), DETECTIONS.rows)
 
 
-def tracks_table() -> Table:
-    """Return `TRACKS` with a column for the zones of a site, for one run."""
-    hazards = OpenHazards()
-
-    def rows(result: FrameResult) -> Columns:
-        hazards.update(result.hazards)
-        of_track: dict[int, set[str]] = {}
-        for hazard in hazards.in_zones():
-            for track_id in hazard.track_ids:
-                of_track.setdefault(track_id, set()).add(hazard.zone)
-        return {**_track_rows(result), "zones": [sorted(of_track.get(i, ())) for i in result.tracks.track_id.tolist()]}
-
-    return Table(_schema((*_TRACK_COLUMNS, _ZONES_COLUMN)), rows)
+def _zoned_track_rows(result: FrameResult) -> Columns:
+    of_track: dict[int, set[str]] = {}
+    for hazard in result.open_hazards.in_zones():
+        for track_id in hazard.track_ids:
+            of_track.setdefault(track_id, set()).add(hazard.zone)
+    return {**_track_rows(result), "zones": [sorted(of_track.get(i, ())) for i in result.tracks.track_id.tolist()]}
 
 
 TRACKS = Table(_schema(_TRACK_COLUMNS), _track_rows)
+ZONED_TRACKS = Table(_schema((*_TRACK_COLUMNS, _ZONES_COLUMN)), _zoned_track_rows)
+"""`TRACKS` of a site that has zones, with a column for them."""
 PROXIMITY = Table(_schema(_PROXIMITY_COLUMNS), _proximity_rows)
 FRAMES = Table(_schema(_FRAMES_COLUMNS), _frame_rows)
 DETECTIONS = Table(_schema(COLUMNS), _detection_rows)

@@ -14,7 +14,7 @@ from standoff.stages.sinks.blurring import PeopleWatch, blur
 from standoff.stages.sinks.drawing import Overlay
 from standoff.stages.sinks.encoder import VideoFile
 from standoff.stages.sinks.params import ShowParams, VideoParams
-from standoff.stages.sinks.scene import OpenHazards, Scene
+from standoff.stages.sinks.scene import Scene
 from standoff.stages.sinks.sketch import Sketch
 from standoff.stages.sinks.text import TextSprites
 
@@ -92,7 +92,6 @@ class VideoSink:
         self._path, self._params, self._zones = Path(path), params or VideoParams(), zones
         self._show = show or ShowParams()
         self._people = PeopleWatch(wanted=self._show.blur)
-        self._hazards = OpenHazards()
         self._composer: Composer | None = None
         self._file: VideoFile | None = None
         self._start_s = 0.0
@@ -104,10 +103,9 @@ class VideoSink:
             self._composer = Composer(frame.size_px, self._params, self._show)
             self._file = VideoFile(self._path, self._composer.size_px, crf=self._params.crf, preset=self._params.preset)
             self._start_s = frame.time_s
-        self._hazards.update(result.hazards)
         size_px = self._composer.picture_size_px
         picture = frame.image if size_px == frame.size_px else frame.picture.resized_bgr(*size_px)
-        scene = Scene.of(result, self._hazards, self._zones, self._people.update(result))
+        scene = Scene.of(result, self._zones, self._people.update(result))
         composed = self._composer.compose(picture, scene)
         self._file.write(composed, frame.time_s - self._start_s)
 

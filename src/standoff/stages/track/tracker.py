@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from standoff.core import protocols
 from standoff.core.boxes import overlaps
 from standoff.core.classes import CLASSES
 from standoff.core.homography import BoolArray, FloatArray
@@ -39,7 +40,7 @@ _TIME_ROUNDING_S = 1e-6
 _LEAST_CLOSENESS = 1e-6
 
 
-class Tracker:
+class Tracker(protocols.Tracker):
     """Turn detections, frame by frame, into tracks of one stream.
 
     Sure detections are assigned to tracks first, then unsure ones to the tracks that are left: a

@@ -8,6 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from standoff.core import protocols
 from standoff.core.finding import WorkerFinding
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.roles import IS_EQUIPMENT
@@ -44,7 +45,7 @@ _RINGS: Final = 4
 _TIME_ROUNDING_S: Final = 1e-6
 
 
-class GroundWatcher:
+class GroundWatcher(protocols.GroundWatcher):
     """Judge the pictures of one stream.
 
     Ground is watched where the map is sure, the picture is sharp, bright and clear enough, and a worker would be tall

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from standoff.core.homography import FloatArray
-from standoff.core.types import WatchedGround
+from standoff.core.watched_ground import WatchedGround
 
 
 def percent_text(share: float | None) -> str:

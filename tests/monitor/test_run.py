@@ -1,10 +1,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
 
+from standoff.core import protocols
 from standoff.core.errors import SourceTruncated
 from standoff.core.types import (
     CameraMotion,
@@ -16,7 +18,7 @@ from standoff.core.types import (
     NoGroundMap,
     Outcome,
 )
-from standoff.pipeline import Pipeline
+from standoff.monitor import Monitor, Run
 from standoff.stages.frames import frame_from_array
 from standoff.stages.ground import Unmapped
 from standoff.stages.hazard import HazardMonitor
@@ -44,7 +46,7 @@ class Memory:
         self.outcomes.append(outcome)
 
 
-class TwoWalkers:
+class TwoWalkers(protocols.Detector):
     """A detector that sees a worker and an excavator, always at the same places."""
 
     def __init__(self) -> None:
@@ -57,7 +59,7 @@ class TwoWalkers:
         )
 
 
-class MetreGround:
+class MetreGround(protocols.Ground):
     """Ten pixels are a metre, everywhere."""
 
     def update(
@@ -67,16 +69,31 @@ class MetreGround:
         return GroundMap(matrix, np.zeros((9, 9)), frame.size_px, "test", 0.1)
 
 
-def frames(count: int, *, broken_after: int | None = None) -> Iterator[Frame]:
-    for index in range(count):
-        if index == broken_after:
-            raise SourceTruncated(expected="10 frames", found=str(index), fix="copy the file again")
-        yield frame_from_array(np.zeros((100, 120, 3), np.uint8), index=index, time_s=index / 10)
+class Film(protocols.Source):
+    """Black pictures, ten a second; says of itself how many it has shown, and can break."""
+
+    size_px = (120, 100)
+
+    def __init__(self, count: int, broken_after: int | None = None) -> None:
+        self.count, self.broken_after, self.shown, self.closed = count, broken_after, 0, False
+
+    @property
+    def description(self) -> dict[str, Any]:
+        return {"shown": self.shown, "warnings": ["dark"]}
+
+    def frames(self) -> Iterator[Frame]:
+        for index in range(self.count):
+            if index == self.broken_after:
+                raise SourceTruncated(expected="10 frames", found=str(index), fix="copy the file again")
+            self.shown += 1
+            yield frame_from_array(np.zeros((100, 120, 3), np.uint8), index=index, time_s=index / 10)
+
+    def close(self) -> None:
+        self.closed = True
 
 
-def pipeline(source: Iterator[Frame], *sinks: Memory, detect_every: int = 1, mapped: bool = True) -> Pipeline:
-    return Pipeline(
-        frames=source,
+def monitor(*, detect_every: int = 1, mapped: bool = True) -> Monitor:
+    return Monitor(
         detector=TwoWalkers(),
         motion=MotionEstimator(),
         ground=MetreGround() if mapped else Unmapped(),
@@ -85,20 +102,26 @@ def pipeline(source: Iterator[Frame], *sinks: Memory, detect_every: int = 1, map
         watcher=GroundWatcher(),
         proximity=ProximityMeter(),
         hazard=HazardMonitor(),
-        sinks={f"sink{number}": sink for number, sink in enumerate(sinks)},
         detect_every=detect_every,
     )
 
 
+def run_of(
+    count: int, *sinks: Memory, broken_after: int | None = None, detect_every: int = 1, mapped: bool = True
+) -> Run:
+    named = {f"sink{number}": sink for number, sink in enumerate(sinks)}
+    return Run(Film(count, broken_after), monitor(detect_every=detect_every, mapped=mapped), named)
+
+
 def test_a_pair_is_measured_in_metres_from_foot_to_foot() -> None:
-    results = list(pipeline(frames(10)).run())
+    results = list(run_of(10))
     distances = results[-1].proximities.distance_m
     assert distances == pytest.approx([5.0])
 
 
 def test_every_frame_reaches_every_sink_with_the_time_of_each_stage() -> None:
     memory = Memory()
-    results = list(pipeline(frames(5), memory).run())
+    results = list(run_of(5, memory))
     assert (
         [result.frame.index for result in memory.results] == [result.frame.index for result in results] == [*range(5)]
     )
@@ -109,10 +132,10 @@ def test_every_frame_reaches_every_sink_with_the_time_of_each_stage() -> None:
 
 
 def test_tracks_coast_and_say_so_while_the_detector_rests() -> None:
-    monitored = pipeline(frames(9), detect_every=3)
-    results = list(monitored.run())
-    assert isinstance(monitored.detector, TwoWalkers)
-    assert monitored.detector.calls == 3
+    monitored = run_of(9, detect_every=3)
+    results = list(monitored)
+    assert isinstance(monitored.monitor.detector, TwoWalkers)
+    assert monitored.monitor.detector.calls == 3
     assert [result.detected for result in results] == [True, False, False] * 3
     for result in results[3:]:
         assert len(result.tracks) == 2
@@ -121,18 +144,18 @@ def test_tracks_coast_and_say_so_while_the_detector_rests() -> None:
 
 @pytest.mark.parametrize(("near_m", "calls"), [(None, 3), (-20.0, 3), (0.0, 9)])
 def test_a_pair_that_is_near_is_looked_at_in_every_frame(near_m: float | None, calls: int) -> None:
-    monitored = pipeline(frames(9), detect_every=3)
-    monitored.detect_near_m = near_m
-    results = list(monitored.run())
-    assert isinstance(monitored.detector, TwoWalkers)
+    monitored = run_of(9, detect_every=3)
+    monitored.monitor.detect_near_m = near_m
+    results = list(monitored)
+    assert isinstance(monitored.monitor.detector, TwoWalkers)
     assert np.isfinite(results[-1].proximities.gap_m).all()
-    assert monitored.detector.calls == calls
+    assert monitored.monitor.detector.calls == calls
 
 
 def test_a_pair_that_is_not_measured_is_looked_at_in_every_frame() -> None:
-    monitored = pipeline(frames(9), detect_every=3, mapped=False)
-    monitored.detect_near_m = 1.0
-    assert [result.detected for result in monitored.run()] == [True] * 9
+    monitored = run_of(9, detect_every=3, mapped=False)
+    monitored.monitor.detect_near_m = 1.0
+    assert [result.detected for result in monitored] == [True] * 9
 
 
 class Weary(TwoWalkers):
@@ -143,16 +166,16 @@ class Weary(TwoWalkers):
 
 
 def test_tracks_coast_where_the_detector_itself_rests() -> None:
-    monitored = pipeline(frames(9))
-    monitored.detector = Weary()
-    results = list(monitored.run())
+    monitored = run_of(9)
+    monitored.monitor.detector = Weary()
+    results = list(monitored)
     assert [result.detected for result in results] == [frame % 2 == 0 for frame in range(9)]
-    assert monitored.detector.calls == 5
+    assert monitored.monitor.detector.calls == 5
     assert not any(result.tracks.observed.any() for result in results[1::2])
 
 
 def test_without_a_map_every_pair_is_there_and_none_is_measured() -> None:
-    results = list(pipeline(frames(10), mapped=False).run())
+    results = list(run_of(10, mapped=False))
     assert len(results[-1].proximities) == 1
     assert np.isnan(results[-1].proximities.distance_m).all()
     unknown = [event for result in results for event in result.hazards]
@@ -161,8 +184,8 @@ def test_without_a_map_every_pair_is_there_and_none_is_measured() -> None:
 
 def test_a_sink_that_fails_is_left_out_and_the_others_go_on() -> None:
     broken, healthy = Memory(fail_at=2), Memory()
-    monitored = pipeline(frames(6), broken, healthy)
-    assert len(list(monitored.run())) == 6
+    monitored = run_of(6, broken, healthy)
+    assert len(list(monitored)) == 6
     assert len(healthy.results) == 6
     assert len(broken.results) == 2
     assert "no space left" in healthy.outcomes[0].sink_errors["sink0"]
@@ -172,7 +195,7 @@ def test_a_sink_that_fails_is_left_out_and_the_others_go_on() -> None:
 def test_a_source_that_breaks_closes_the_sinks_as_failed_and_keeps_what_was_done() -> None:
     memory = Memory()
     with pytest.raises(SourceTruncated):
-        list(pipeline(frames(10, broken_after=4), memory).run())
+        list(run_of(10, memory, broken_after=4))
     assert len(memory.results) == 4
     assert memory.outcomes[0].status == "failed"
     assert "expected 10 frames, found 4" in memory.outcomes[0].message
@@ -180,14 +203,14 @@ def test_a_source_that_breaks_closes_the_sinks_as_failed_and_keeps_what_was_done
 
 def test_stopping_early_closes_the_sinks_as_interrupted() -> None:
     memory = Memory()
-    run = pipeline(frames(10), memory).run()
-    next(run)
-    run.close()
+    results = iter(run_of(10, memory))
+    next(results)
+    results.close()
     assert memory.outcomes[0].status == "interrupted"
 
 
 def test_hazards_still_open_at_the_end_are_closed_in_the_outcome() -> None:
     memory = Memory()
-    opened = {event.hazard_id for result in pipeline(frames(30), memory).run() for event in result.hazards}
+    opened = {event.hazard_id for result in run_of(30, memory) for event in result.hazards}
     closed = {event.hazard_id for event in memory.outcomes[0].hazards if event.phase == "closed"}
     assert opened and closed == opened

@@ -1,0 +1,27 @@
+"""What a run may write, by name: settings, help, clean-up and the sinks themselves go by this one table."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Final
+
+RECORD_FILE: Final = "run.json"
+ZONES_FILE: Final = "zones.geojson"
+"""The zones of the site, in its frame, where there are any."""
+
+OUTPUTS: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "tracks": "tracks.parquet",
+        "proximity": "proximity.parquet",
+        "frames": "frames.parquet",
+        "detections": "detections.parquet",
+        "hazards": "hazards.jsonl",
+        "video": "annotated.mp4",
+        "report": "report.html",
+    }
+)
+"""The file of each output that can be left out."""
+
+RUN_FILES: Final[tuple[str, ...]] = (RECORD_FILE, ZONES_FILE, *OUTPUTS.values())
+"""Every file that a run can write, by its final name."""

@@ -1,0 +1,28 @@
+"""A stream that is watched: its stages (`Monitor`), where results go (`FanOut`, `LiveQueue`), and a whole film.
+
+from standoff.config import load_settings
+from standoff.monitor import open_run
+for result in open_run("site.mp4", "out", load_settings(Path("site.yaml"))):
+    ...
+"""
+
+from standoff.monitor.build import build_monitor
+from standoff.monitor.fan_out import FanOut
+from standoff.monitor.live_queue import LiveQueue, QueueState
+from standoff.monitor.monitor import Monitor
+from standoff.monitor.open_run import open_run
+from standoff.monitor.run import Run, warnings_of
+from standoff.monitor.run_folder import RunFolder, RunRecord
+
+__all__ = [
+    "FanOut",
+    "LiveQueue",
+    "Monitor",
+    "QueueState",
+    "Run",
+    "RunFolder",
+    "RunRecord",
+    "build_monitor",
+    "open_run",
+    "warnings_of",
+]

@@ -1,0 +1,219 @@
+"""The stages called in order; nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from standoff.core.protocols import (
+    CameraMotionEstimator,
+    Detector,
+    Ground,
+    GroundWatcher,
+    HazardMonitor,
+    Locator,
+    ProximityMeter,
+    Stage,
+    Tracker,
+)
+from standoff.core.run_counts import RunCounts
+from standoff.core.types import (
+    Detections,
+    Frame,
+    FrameResult,
+    GroundPositions,
+    Hazard,
+    NoGroundMap,
+    OpenHazards,
+    Proximities,
+    Silence,
+    WatchedGround,
+)
+from standoff.core.unfollowed import SURE_SCORE, unfollowed
+
+_AHEAD_S = 1.0
+"""A gap that closes counts as what it will be then."""
+
+
+@dataclass
+class Monitor:
+    """One stream's stages and what they know of it: neither where frames come from nor where results go.
+
+    Attributes:
+        detector: Runs on every `detect_every`-th frame, unless it rests there; tracks coast in between. While a pair
+            is near, or may be, it runs on every frame (`detect_near_m`).
+        motion: Reads every frame.
+        ground: Reads every frame.
+        sure_score: What the detector is so sure of has to be in a track.
+        counts: What happened so far.
+        open_hazards: Which hazards are open now.
+    """
+
+    detector: Detector
+    motion: CameraMotionEstimator
+    ground: Ground
+    tracker: Tracker
+    locator: Locator
+    watcher: GroundWatcher
+    proximity: ProximityMeter
+    hazard: HazardMonitor
+    detect_every: int = 1
+    detect_near_m: float | None = None
+    sure_score: float = SURE_SCORE
+    counts: RunCounts = field(default_factory=RunCounts)
+    open_hazards: OpenHazards = field(default_factory=OpenHazards)
+    _last: FrameResult | None = None
+    _is_near: bool = False
+
+    @property
+    def stages(self) -> dict[str, Stage]:
+        """All stages by name, in the order in which they are called."""
+        return {
+            "detect": self.detector,
+            "motion": self.motion,
+            "ground": self.ground,
+            "track": self.tracker,
+            "locate": self.locator,
+            "watched": self.watcher,
+            "proximity": self.proximity,
+            "hazard": self.hazard,
+        }
+
+    def prepare(self, size_px: tuple[int, int]) -> None:
+        """Let every stage look at the (width, height) of the stream's pictures, before the first of them.
+
+        Raises:
+            StandoffError: A stage cannot work on them.
+        """
+        for stage in self.stages.values():
+            stage.prepare(size_px)
+
+    def step(self, frame: Frame) -> FrameResult:
+        """Take one frame through all stages."""
+        stage_ms: dict[str, float] = {}
+        detections = Detections.empty()
+        wanted = self._is_near or self.counts.rows["frames"] % self.detect_every == 0
+        detected = wanted and not self.detector.rests(frame)
+        if detected:
+            with clocked(stage_ms, "detect"):
+                detections = self.detector.detect(frame)
+        with clocked(stage_ms, "motion"):
+            motion = self.motion.update(frame, detections)
+        with clocked(stage_ms, "ground"):
+            ground = self.ground.update(frame, detections, motion)
+        with clocked(stage_ms, "track"):
+            tracks = (
+                self.tracker.update(frame.time_s, detections, motion, ground)
+                if detected
+                else self.tracker.coast(frame.time_s, motion)
+            )
+            lost = unfollowed(detections, tracks, self.sure_score)
+        with clocked(stage_ms, "locate"):
+            positions = self.locator.update(frame.time_s, tracks, ground)
+        with clocked(stage_ms, "watched"):
+            watched = self.watcher.update(frame, ground, tracks, positions)
+        with clocked(stage_ms, "proximity"):
+            proximities = self.proximity.update(frame.time_s, positions, ground)
+        with clocked(stage_ms, "hazard"):
+            hazards = self.hazard.update(frame.time_s, positions, proximities, ground, lost, watched)
+        self.open_hazards = self.open_hazards.after(hazards)
+        self._last = FrameResult(
+            frame=frame,
+            detections=detections,
+            detected=detected,
+            motion=motion,
+            ground=ground,
+            tracks=tracks,
+            positions=positions,
+            proximities=proximities,
+            hazards=hazards,
+            stage_ms=stage_ms,
+            unfollowed=lost,
+            watched=watched,
+            open_hazards=self.open_hazards,
+        )
+        self.counts.add(self._last)
+        self._is_near = self._are_near(proximities)
+        return self._last
+
+    def tick(self, time_s: float, reason: str, stream_id: str = "") -> Silence:
+        """Take that nothing arrives: nobody's place is known, and what is open becomes unknown.
+
+        Args:
+            time_s: When, in the stream's presentation time.
+            reason: Why nothing arrives.
+            stream_id: For a stream of which no frame came yet.
+        """
+        last = self._last
+        positions = GroundPositions.empty() if last is None else _unplaced(last.positions, reason)
+        pairs = Proximities.empty() if last is None else _unmeasured(last.proximities)
+        nothing_lost = np.zeros(0, dtype=np.bool_)
+        hazards = self.hazard.update(time_s, positions, pairs, NoGroundMap(reason), nothing_lost, WatchedGround())
+        self._note(hazards)
+        return Silence(stream_id if last is None else last.frame.stream_id, time_s, reason, hazards, self.open_hazards)
+
+    def close(self, time_s: float, *, lost: str = "") -> tuple[Hazard, ...]:
+        """End the stream and return what is said last: of what is open, that it closes, or that it is unknown.
+
+        Args:
+            time_s: When, in the stream's presentation time.
+            lost: Why the stream ended before it should have; empty where it came to its end.
+        """
+        hazards = self.hazard.lose(time_s, lost) if lost else self.hazard.close(time_s)
+        self._note(hazards)
+        return hazards
+
+    def describe(self) -> dict[str, Any]:
+        """Return what the stages say of themselves so far, for the record."""
+        return {name: stage.description for name, stage in self.stages.items()}
+
+    def _note(self, hazards: tuple[Hazard, ...]) -> None:
+        self.open_hazards = self.open_hazards.after(hazards)
+        self.counts.add_events(hazards)
+
+    def _are_near(self, proximities: Proximities) -> bool:
+        """Return whether a gap is, or within a second will be, below `detect_near_m`, where the rhythm asks for it."""
+        if self.detect_every == 1 or self.detect_near_m is None:
+            return False
+        soon_m = proximities.gap_m - np.maximum(np.nan_to_num(proximities.closing_mps), 0.0) * _AHEAD_S
+        # A pair that is not measured may be near.
+        return not bool((soon_m >= self.detect_near_m).all())
+
+
+@contextmanager
+def clocked(stage_ms: dict[str, float], stage: str) -> Iterator[None]:
+    """Write down how many milliseconds something takes."""
+    start_s = perf_counter()
+    yield
+    stage_ms[stage] = (perf_counter() - start_s) * 1e3
+
+
+def _unplaced(positions: GroundPositions, reason: str) -> GroundPositions:
+    """Return the same entities, of none of which is known where it is."""
+    count = len(positions)
+    return replace(
+        positions,
+        xy_m=np.full((count, 2), np.nan),
+        velocity_mps=np.full((count, 2), np.nan),
+        state_covariance=np.full((count, 4, 4), np.nan),
+        map_factor_m=np.full((count, 2, 10), np.nan),
+        predicted=np.ones(count, dtype=np.bool_),
+        standing_s=np.full(count, np.nan),
+        valid=np.zeros(count, dtype=np.bool_),
+        reason=np.full(count, reason, dtype=object),
+    )
+
+
+def _unmeasured(pairs: Proximities) -> Proximities:
+    """Return the same pairs, none of which is measured."""
+    nothing = np.full(len(pairs), np.nan)
+    names = ("distance_m", "gap_m", "sigma_m", "closing_mps", "time_to_contact_s", "closest_m", "closest_in_s")
+    unknown = dict.fromkeys((*names, "breach_now", "breach_ahead"), nothing)
+    return replace(
+        pairs, **unknown, filtered=np.zeros(len(pairs), dtype=np.bool_), excuse=np.full(len(pairs), "", dtype=object)
+    )

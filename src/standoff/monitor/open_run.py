@@ -1,0 +1,96 @@
+"""From a source, a folder and settings to a run that is ready to begin."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import asdict
+from pathlib import Path
+
+from standoff.config import Settings, build_replacement, build_zones, resolved
+from standoff.core.errors import OutputError
+from standoff.core.outputs import RUN_FILES, ZONES_FILE
+from standoff.core.protocols import Sink
+from standoff.core.types import Outcome
+from standoff.files.zone_file import write_zones
+from standoff.monitor.build import build_monitor
+from standoff.monitor.run import Run, describe_run
+from standoff.monitor.run_folder import RunFolder
+from standoff.stages.detect import RecordedDetector
+from standoff.stages.frames import local_path, open_source
+from standoff.stages.sinks import Wanted, make_sink, prepare_output
+
+
+def open_run(
+    source: Path | str,
+    out: Path | str,
+    settings: Settings,
+    *,
+    overwrite: bool = False,
+    checked: Callable[[], str] | None = None,
+    more_sinks: Mapping[str, Sink] | None = None,
+) -> Run:
+    """Open the source, build the monitor, then prepare the folder: nothing is written if anything is wrong.
+
+    Args:
+        source: Video file or folder of pictures, or its `file:` address.
+        out: Output folder; created.
+        settings: What to run.
+        overwrite: Replace the files of an earlier run in the folder.
+        more_sinks: Beside those of the settings, and before them.
+        checked: For the report, after the last frame: how true the stated errors are, where truth is known.
+
+    Raises:
+        StandoffError: A source, model, survey, camera, setting or folder that cannot be used.
+    """
+    read = {
+        "the source": local_path(source),
+        "the recorded detections": settings.detections,
+        "the zones": settings.zones,
+    }
+    for what, path in read.items():
+        if path is not None:
+            _refuse_to_replace(path.resolve(), Path(out).resolve(), what)
+    zones = build_zones(settings)
+    frames = open_source(source, **asdict(settings.source))
+    monitor = build_monitor(settings, frames.camera_prior)
+    monitor.prepare(frames.size_px)
+    if isinstance(monitor.detector, RecordedDetector):
+        monitor.detector.check_source(frames.description)
+    extra = {name: build_replacement(name, one, Sink) for name, one in settings.extra_outputs.items()}
+    # The record first, so that a folder without room is told before anything else is begun.
+    about = {"settings": resolved(settings), **describe_run(frames, monitor)}
+    folder = RunFolder(prepare_output(out, overwrite=overwrite), about)
+    wanted = Wanted(
+        source=frames.description,
+        detector=monitor.detector.description,
+        tables=settings.tables,
+        video=settings.video,
+        report=settings.report,
+        show=settings.show,
+        zones=zones,
+        warning_gap_m=settings.hazard.buffer_m,
+        checked=checked,
+    )
+    try:
+        if zones:
+            write_zones(folder.path / ZONES_FILE, zones)
+        own = {name: make_sink(name, folder.path, wanted) for name in settings.outputs}
+    except OSError as error:
+        refused = OutputError(
+            expected=f"room for the outputs in {folder.path}",
+            found=error.strerror or str(error),
+            fix="make room, or choose another folder",
+        )
+        with suppress(OutputError):
+            folder.finish(Outcome("failed", str(refused)), {})
+        raise refused from error
+    return Run(frames, monitor, {**(more_sinks or {}), **own, **extra}, folder)
+
+
+def _refuse_to_replace(source: Path, out: Path, what: str) -> None:
+    """Raise OutputError where the outputs would replace what is read, or lie among its pictures."""
+    if source == out or (source.parent == out and source.name in RUN_FILES):
+        raise OutputError(
+            expected=f"outputs apart from {what}", found=f"{source} and {out}", fix="choose another output folder"
+        )

@@ -1,0 +1,135 @@
+"""A monitor between a source and its sinks, from the first frame to the record of how it ended."""
+
+from __future__ import annotations
+
+import logging
+from collections import defaultdict
+from collections.abc import Generator, Iterator, Mapping
+from dataclasses import replace
+from typing import Any
+
+from standoff.core.durations import Durations
+from standoff.core.errors import OutputError
+from standoff.core.protocols import Described, Sink, Source
+from standoff.core.types import Frame, FrameResult, Outcome
+from standoff.monitor.fan_out import FanOut
+from standoff.monitor.monitor import Monitor, clocked
+from standoff.monitor.run_folder import RunFolder, RunRecord
+
+STOPPED = "stopped before the end of the source"
+
+_LOG = logging.getLogger(__name__)
+
+
+class Run:
+    """Pull frames from a source through a monitor to sinks; iterate over it once, and it is done.
+
+    Args:
+        source: Closed at the end.
+        monitor: Of this stream.
+        sinks: By name; closed at the end, however it comes.
+        folder: What holds the record, and is nobody else's while the run goes on; None: there is none.
+
+    Attributes:
+        source: Where the frames come from.
+        monitor: The stages.
+        folder: As given.
+    """
+
+    def __init__(
+        self,
+        source: Source,
+        monitor: Monitor,
+        sinks: Mapping[str, Sink] | None = None,
+        folder: RunFolder | None = None,
+    ) -> None:
+        self.source, self.monitor, self.folder = source, monitor, folder
+        self._fan_out = FanOut(sinks or {})
+        self._stages: defaultdict[str, Durations] = defaultdict(Durations)
+
+    @property
+    def record(self) -> RunRecord:
+        """What the record of the folder says, or should say where it could not be written.
+
+        Raises:
+            ValueError: The run has no folder.
+        """
+        if self.folder is None:
+            raise ValueError("a run without a folder keeps no record")
+        return self.folder.record
+
+    @property
+    def sink_errors(self) -> Mapping[str, str]:
+        """Message of each output that gave up so far, by name."""
+        return self._fan_out.errors
+
+    @property
+    def warnings(self) -> list[str]:
+        """What is odd about the source, the set-up and what was seen so far, a clause each."""
+        return warnings_of(self.source, *self.monitor.stages.values())
+
+    def __iter__(self) -> Generator[FrameResult, None, None]:
+        """Yield each frame's result after the sinks have it, with their times; close everything however it ends."""
+        outcome, time_s, lost = Outcome("complete"), 0.0, ""
+        try:
+            frames = self.source.frames()
+            while (step := self._step(frames)) is not None:
+                time_s = step.frame.time_s
+                yield step
+        except (KeyboardInterrupt, GeneratorExit):
+            outcome = Outcome("interrupted", STOPPED)
+            raise
+        except BaseException as error:
+            lost = str(error) or type(error).__name__
+            outcome = Outcome("failed", lost)
+            raise
+        finally:
+            try:
+                outcome = replace(outcome, hazards=self.monitor.close(time_s, lost=lost))
+            finally:
+                self._end(outcome)
+
+    def _step(self, frames: Iterator[Frame]) -> FrameResult | None:
+        """Take the next frame all the way; None where there is none."""
+        read_ms: dict[str, float] = {}
+        with clocked(read_ms, "frames"):
+            frame = next(frames, None)
+        if frame is None:
+            return None
+        result = self.monitor.step(frame)
+        stage_ms = {**read_ms, **result.stage_ms, **self._fan_out.write(result)}
+        for stage, duration_ms in stage_ms.items():
+            self._stages[stage].add(duration_ms)
+        return replace(result, stage_ms=stage_ms)
+
+    def _end(self, outcome: Outcome) -> None:
+        # What the source lost, and what the stages saw, is known only now.
+        known = {} if self.folder is None else self.folder.record.about
+        about = {**known, **describe_run(self.source, self.monitor)}
+        ended = replace(outcome, about=about, counts=self.monitor.counts)
+        self._fan_out.close(ended)
+        self.source.close()
+        if self.folder is not None:
+            ended = replace(ended, sink_errors=dict(self._fan_out.errors))
+            try:
+                self.folder.finish(ended, {name: durations.summary() for name, durations in self._stages.items()})
+            except OutputError as error:
+                _LOG.error("output record stopped: %s", error)
+                self._fan_out.errors["record"] = str(error)
+
+
+def describe_run(source: Source, monitor: Monitor) -> dict[str, Any]:
+    """Return what is known of a run, for its record and its report: before the first frame, or after the last."""
+    return {
+        "source": source.description,
+        "model": monitor.detector.description,
+        "ground": monitor.ground.description,
+        "watched": monitor.watcher.description,
+        "alarms": monitor.hazard.description.get("alarms"),
+        "warnings": warnings_of(source, *monitor.stages.values()),
+    }
+
+
+def warnings_of(*parts: Described) -> list[str]:
+    """Return what is odd about some parts and about what they saw so far, a clause each."""
+    return [text for part in parts for text in part.description.get("warnings", ())]
