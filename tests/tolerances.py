@@ -225,7 +225,7 @@ COVERAGE_OF_A_KIND = 0.85
 """Of the 95 % intervals of one kind of pair over some thirty clips, a dozen of which show it at all."""
 
 GOLDEN_REL = 0.01
-"""Of a number of a golden table, or of 1 where it is smaller: what another order of sums grows to in a random search."""
+"""Of a number of a golden table, or of 1 where it is smaller: to which another order of sums grows by chance."""
 
 GOLDEN_SHARE = 0.99
 """Of the numbers of a column that must agree: a track may change its box in another frame by one."""

@@ -19,6 +19,7 @@ from standoff.evaluation.bench_baselines import decoding_baseline, picture_basel
 from standoff.evaluation.bench_workload import DrawingSink, ScriptedDetector, Site, SiteFilm, monitor_workload
 from standoff.evaluation.timing import Baseline, Spread, StageTimes, collect_times, machine
 from standoff.monitor import Monitor, Run
+from standoff.stages.frames import SourceParams
 from standoff.stages.hazard import HazardMonitor
 from standoff.stages.locate import Locator
 from standoff.stages.motion import MotionEstimator
@@ -156,7 +157,8 @@ def test_a_source_is_timed_with_all_its_outputs_and_nothing_is_left_behind(
         for index in range(12):
             cv2.imwrite(str(source / f"{index}.png"), coded_picture(index))
     blind = Replacement(factory="evaluation.blind_detector:BlindDetector")
-    report = bench_source(source, Settings(replace={"detect": blind}, fps=fps), frames=8, workload_frames=10).to_dict()
+    settings = Settings(replace={"detect": blind}, source=SourceParams(fps=fps))
+    report = bench_source(source, settings, frames=8, workload_frames=10).to_dict()
     json.dumps(report, allow_nan=False)
     assert report["stages"]["track"]["samples"] == 8
     assert {"sinks.drawing", "sinks.video", "sinks.tracks"} <= report["stages"].keys()

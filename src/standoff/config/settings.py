@@ -276,7 +276,7 @@ def _refuse_boolean(given: object, made: object, path: str) -> None:
 
 def _inner_names(fields: Mapping[str, FieldInfo]) -> dict[str, str]:
     """Return by the name of a setting inside a section which section has it, the first one of several."""
-    sections = {name: info.annotation for name, info in reversed(fields.items()) if is_dataclass(info.annotation)}
+    sections = {name: info.annotation for name, info in reversed(list(fields.items())) if is_dataclass(info.annotation)}
     return {inner: name for name, annotation in sections.items() for inner in get_type_hints(annotation)}
 
 

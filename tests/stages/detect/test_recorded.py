@@ -8,7 +8,7 @@ import pytest
 from clips.test_detections_table import RESULT, SOURCE, result_of, some, write
 
 from standoff.core.errors import DataError
-from standoff.core.protocols import RestingDetector
+from standoff.core.protocols import Detector
 from standoff.core.types import Frame
 from standoff.stages.detect import RecordedDetector
 from standoff.stages.frames import frame_from_array
@@ -30,7 +30,7 @@ def test_each_frame_gets_its_own_detections(detector: RecordedDetector) -> None:
 
 
 def test_seeing_nothing_is_not_resting(detector: RecordedDetector) -> None:
-    assert isinstance(detector, RestingDetector)
+    assert isinstance(detector, Detector)
     assert [detector.rests(frame(index)) for index in (0, 2, 4, 6)] == [False, False, True, False]
     with pytest.raises(DataError, match="rested"):
         detector.detect(frame(4))

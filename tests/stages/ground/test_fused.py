@@ -194,7 +194,7 @@ def _detected(box: FloatArray) -> Detections:
 def test_a_camera_for_pictures_of_another_shape_is_refused() -> None:
     ground = _ground(camera=CameraPrior.calibrated(lens(size_px=(640, 480))))
     with pytest.raises(GroundError, match="aspect"):
-        ground.check_size((640, 360))
+        ground.prepare((640, 360))
     with pytest.raises(GroundError, match="aspect"):
         ground.update(frame(_picture(0), 0.0), NOTHING, STILL)
 

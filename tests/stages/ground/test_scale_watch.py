@@ -218,7 +218,7 @@ def test_what_a_detector_is_not_sure_of_says_nothing() -> None:
 
 
 def test_no_map_stays_no_map_with_its_own_reason() -> None:
-    class Unmapped:
+    class Unmapped(protocols.Ground):
         def update(self, frame: Frame, detections: Detections, motion: AnyMotion) -> AnyGround:
             return NoGroundMap("its own")
 
@@ -227,7 +227,7 @@ def test_no_map_stays_no_map_with_its_own_reason() -> None:
     result = watch.update(Frame("drawn", 0, 0.0, _PICTURE), workers(_BOXES), motion)
     assert isinstance(result, NoGroundMap)
     assert result.reason == "its own"
-    watch.check_size((1, 1))
+    watch.prepare((1, 1))
 
 
 def test_a_mirrored_map_is_not_judged_by_sizes() -> None:
