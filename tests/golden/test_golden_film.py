@@ -46,8 +46,8 @@ def assert_alike(column: str, before: list[Any], now: list[Any]) -> None:
         assert all(one == other for one, other in known), column
         return
     one, other = (np.array([pair[k] for pair in known], dtype=np.float64) for k in (0, 1))
-    same = (one == other) | (np.abs(one - other) <= GOLDEN_REL * np.maximum(np.abs(one), 1.0))
-    assert same.mean() >= GOLDEN_SHARE, (column, np.nanmax(np.abs(one - other)))
+    same = np.isclose(other, one, rtol=GOLDEN_REL, atol=GOLDEN_REL)
+    assert same.mean() >= GOLDEN_SHARE, (column, one[~same], other[~same])
 
 
 def test_the_hazards_of_the_film_are_as_they_were(film: tuple[Path, float]) -> None:

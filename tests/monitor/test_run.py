@@ -214,3 +214,52 @@ def test_hazards_still_open_at_the_end_are_closed_in_the_outcome() -> None:
     opened = {event.hazard_id for result in run_of(30, memory) for event in result.hazards}
     closed = {event.hazard_id for event in memory.outcomes[0].hazards if event.phase == "closed"}
     assert opened and closed == opened
+
+
+def test_what_the_source_says_at_the_end_is_what_the_sinks_hear() -> None:
+    memory = Memory()
+    ran = run_of(7, memory)
+    assert len(list(ran)) == 7
+    (outcome,) = memory.outcomes
+    assert outcome.about["source"]["shown"] == 7
+    assert outcome.about["warnings"][0] == "dark"
+    assert outcome.counts.rows["frames"] == 7
+    assert isinstance(ran.source, Film) and ran.source.closed
+
+
+def test_what_is_open_is_in_every_result() -> None:
+    open_ids: set[str] = set()
+    for result in run_of(30):
+        open_ids |= {event.hazard_id for event in result.hazards}
+        assert {event.hazard_id for event in result.open_hazards.latest} == open_ids
+    assert open_ids
+
+
+def test_hazards_of_a_stream_that_was_lost_become_unknown_and_are_not_closed() -> None:
+    memory = Memory()
+    with pytest.raises(SourceTruncated):
+        list(run_of(30, memory, broken_after=20))
+    opened = {event.hazard_id for result in memory.results for event in result.hazards}
+    last = {event.hazard_id: event.phase for event in memory.outcomes[0].hazards}
+    assert opened and last == dict.fromkeys(opened, "unknown")
+    assert {event.reason for event in memory.outcomes[0].hazards} == {memory.outcomes[0].message}
+
+
+def test_a_camera_that_is_silent_makes_everything_unknown_within_a_second() -> None:
+    watched = monitor()
+    for frame in Film(20).frames():
+        result = watched.step(frame)
+    (pair,) = result.open_hazards.by_pair().values()
+    assert pair.phase != "unknown"
+    told = [watched.tick(2.0 + step / 10, "no picture arrives") for step in range(11)]
+    assert told[-1].open_hazards.by_pair()[pair.track_ids[0], pair.track_ids[1]].phase == "unknown"
+    (of_stream,) = told[-1].open_hazards.of_stream()
+    assert of_stream.reason == "no picture arrives"
+    assert watched.counts.rows["frames"] == 20
+    again = watched.step(frame_from_array(np.zeros((100, 120, 3), np.uint8), index=20, time_s=3.2))
+    assert again.ground and len(again.tracks)
+
+
+def test_a_camera_that_never_told_anything_is_unknown_too() -> None:
+    silence = monitor().tick(5.0, "no picture arrives", "gate")
+    assert (silence.stream_id, [event.rule for event in silence.hazards]) == ("gate", ["measurement"])

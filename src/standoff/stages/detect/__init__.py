@@ -10,6 +10,7 @@ from standoff.stages.detect.detector import OnnxDetector
 from standoff.stages.detect.params import DetectParams
 from standoff.stages.detect.recorded import RecordedDetector
 from standoff.stages.detect.runtime import available_providers
+from standoff.stages.detect.shared import SharedDetector
 from standoff.stages.detect.shipped import SHIPPED_MODELS, ShippedModel, find_model
 
 __all__ = [
@@ -18,6 +19,7 @@ __all__ = [
     "DetectParams",
     "OnnxDetector",
     "RecordedDetector",
+    "SharedDetector",
     "ShippedModel",
     "available_providers",
     "find_model",
