@@ -14,6 +14,7 @@ from typing import Any, ClassVar, Literal, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from standoff.core.clock import ToldBy as ToldBy
 from standoff.core.ground_map import GroundMap as GroundMap
 from standoff.core.ground_map import NoGroundMap as NoGroundMap
 from standoff.core.hazards import Hazard as Hazard
@@ -91,7 +92,8 @@ class Frame:
         stream_id: Name of the stream.
         index: Position in the source, counting every frame, also those that `every` skips.
         time_s: Presentation timestamp, seconds from the start of the source.
-        captured_at: Aware UTC time of capture, or None when the source does not tell.
+        captured_at: Aware UTC time of capture, or None when nobody tells.
+        told_by: Who tells it; None with it.
         picture: The pixels.
         telemetry: What the drone said of itself at that moment; None: nothing.
     """
@@ -101,6 +103,7 @@ class Frame:
     time_s: float
     picture: Picture
     captured_at: datetime | None = None
+    told_by: ToldBy | None = None
     telemetry: Telemetry | None = None
 
     @property

@@ -21,7 +21,7 @@ from urllib.parse import unquote
 from standoff.core import protocols
 from standoff.core.camera import CameraPrior
 from standoff.core.errors import SourceError
-from standoff.core.types import Frame, ImageArray
+from standoff.core.types import Frame, ImageArray, ToldBy
 from standoff.stages.frames.folder import FolderReader
 from standoff.stages.frames.pictures import ArrayPicture
 from standoff.stages.frames.reader import TIME_ROUNDING_S, Reader, Selection, Shot
@@ -103,7 +103,8 @@ class Source(protocols.Source):
         for shot in self._shots:
             captured_at = None if started_at is None else started_at + timedelta(seconds=shot.time_s)
             telemetry = self._telemetry.at(shot)
-            yield Frame(self.stream_id, shot.index, shot.time_s, shot.picture, captured_at, telemetry)
+            told_by: ToldBy | None = None if captured_at is None else "file"
+            yield Frame(self.stream_id, shot.index, shot.time_s, shot.picture, captured_at, told_by, telemetry)
 
     @property
     def camera_prior(self) -> CameraPrior:
@@ -124,6 +125,7 @@ class Source(protocols.Source):
             **self._selection._asdict(),
             "warnings": list(self.warnings),
             "frames_expected": self.frame_count,
+            "utc": {"first": self._reader.started_at, "told_by": None if self._reader.started_at is None else "file"},
             "telemetry": self._telemetry.description,
             "camera": {
                 "origin": prior.origin,

@@ -31,6 +31,8 @@ _FRAME_COLUMNS = (
     ("stream_id", pa.string(), "", "name of the stream"),
     ("frame", pa.int64(), "", "index in the source, from 0, skipped frames counted"),
     ("time_s", pa.float64(), "s", "presentation timestamp from the start of the source"),
+    ("captured_at", pa.timestamp("us", tz="UTC"), "", "when the picture was taken; null: nobody tells"),
+    ("told_by", pa.string(), "", "who tells when it was taken: file, arrival, rtcp, telemetry; null: nobody"),
 )
 _TRACK_COLUMNS = (
     *_FRAME_COLUMNS,
@@ -140,7 +142,13 @@ def _schema(columns: tuple[tuple[str, pa.DataType, str, str], ...]) -> pa.Schema
 
 def _frame_columns(result: FrameResult, rows: int) -> dict[str, TextArray]:
     frame = result.frame
-    values = {"stream_id": frame.stream_id, "frame": frame.index, "time_s": frame.time_s}
+    values = {
+        "stream_id": frame.stream_id,
+        "frame": frame.index,
+        "time_s": frame.time_s,
+        "captured_at": frame.captured_at,
+        "told_by": frame.told_by,
+    }
     return {name: np.full(rows, value, dtype=object) for name, value in values.items()}
 
 
