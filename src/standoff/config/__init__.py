@@ -23,6 +23,7 @@ from standoff.config.settings import (
     Replacement,
     Settings,
 )
+from standoff.config.site import SiteSettings, StreamSettings, load_site
 
 __all__ = [
     "STAGE_NAMES",
@@ -31,6 +32,8 @@ __all__ = [
     "ReferenceSettings",
     "Replacement",
     "Settings",
+    "SiteSettings",
+    "StreamSettings",
     "build_ground",
     "build_marker_observer",
     "build_replacement",
@@ -39,6 +42,7 @@ __all__ = [
     "build_zones",
     "import_factory",
     "load_settings",
+    "load_site",
     "read_params",
     "read_settings_file",
     "resolved",

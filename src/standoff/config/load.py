@@ -63,7 +63,7 @@ _NAMED: Final = {"model": SHIPPED_MODELS, "telemetry": ("none",)}
 """What stands in place of a path and is none."""
 
 
-def _anchor_paths(settings: dict[str, Any], folder: Path) -> None:
+def anchor_paths(settings: dict[str, Any], folder: Path) -> None:
     """Make paths absolute: those of a file are relative to it, not to wherever the program was started."""
     ground, source = settings.get("ground"), settings.get("source")
     places = (
@@ -136,15 +136,28 @@ def load_settings(path: Path | str | None = None, overrides: Mapping[str, Any] |
     Raises:
         ConfigError: A file that cannot be read, a name that does not exist, a value out of bounds.
     """
-    _check_environment()
     from_file: dict[str, Any] = {}
     if path is not None:
         path = Path(path)
         from_file = read_settings_file(path)
-        _anchor_paths(from_file, path.parent)
+        anchor_paths(from_file, path.parent)
+    return settings_from(from_file, str(path) if path else "the command line and environment", overrides)
 
+
+def settings_from(from_file: Mapping[str, Any], origin: str, overrides: Mapping[str, Any] | None = None) -> Settings:
+    """Check settings by name, under the environment and the overrides.
+
+    Args:
+        from_file: Nested settings, their paths absolute.
+        origin: Where they stand, for the message.
+        overrides: As for `load_settings`.
+
+    Raises:
+        ConfigError: A name that does not exist, a value out of bounds.
+    """
+    _check_environment()
     from_caller = copy.deepcopy(dict(overrides or {}))
-    _anchor_paths(from_caller, Path.cwd())
+    anchor_paths(from_caller, Path.cwd())
 
     class _FileSettings(Settings):
         @classmethod
@@ -156,12 +169,12 @@ def load_settings(path: Path | str | None = None, overrides: Mapping[str, Any] |
             dotenv_settings: PydanticBaseSettingsSource,
             file_secret_settings: PydanticBaseSettingsSource,
         ) -> tuple[PydanticBaseSettingsSource, ...]:
-            return init_settings, env_settings, InitSettingsSource(settings_cls, from_file)
+            return init_settings, env_settings, InitSettingsSource(settings_cls, dict(from_file))
 
     try:
         return _FileSettings(**from_caller)
     except ValidationError as error:
-        raise config_error(str(path) if path else "the command line and environment", error) from error
+        raise config_error(origin, error) from error
 
 
 def resolved(settings: Settings) -> dict[str, Any]:

@@ -129,14 +129,25 @@ def test_frames_are_asked_for_where_both_can_be_seen_and_are_near() -> None:
 
 def test_what_is_said_is_what_an_operator_sees_and_unknown_where_nothing_is_measured() -> None:
     clip = small_clip([7.0, 7.0, 8.0, 20.0, 20.0])
+    by_distance = load_settings(None, {"hazard": {"rule": "distance"}})
     found = score_frames(
-        clip, watched_as([7.0, 7.0, 8.0, NAN, 20.0], ["", "danger", "warning", "danger", "unknown"]), SETTINGS
+        clip, watched_as([7.0, 7.0, 8.0, NAN, 20.0], ["", "danger", "warning", "danger", "unknown"]), by_distance
     )
     assert found.said.counts == ((1, 0, 1, 0), (0, 1, 0, 0), (0, 0, 0, 2))
     assert found.measured.counts == ((2, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 1))
     pooled = FrameByFrame.together([found, found])
     assert pooled.said.macro_f1 == found.said.macro_f1
     assert found.to_dict()["said"]["breach_called_clear_share"] == 0.5
+
+
+def test_a_warning_by_probability_is_due_while_a_breach_is_to_come() -> None:
+    true_m = [9.0] * 8 + [7.0] + [9.0] * 9
+    said = [""] * 3 + ["warning"] * 5 + ["danger"] + [""] * 9
+    settings = load_settings(None, {"proximity": {"horizon_s": 2.0}})
+    found = score_frames(small_clip(true_m), watched_as(true_m, said), settings).said
+    # The frames are half a second apart: four of them are within two seconds before the breach, and of the last four
+    # nobody knows what follows.
+    assert found.counts == ((1, 0, 0, 0), (0, 4, 0, 0), (0, 1, 8, 0))
 
 
 def test_the_radii_and_the_buffer_are_those_of_the_settings() -> None:

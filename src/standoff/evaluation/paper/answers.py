@@ -127,7 +127,8 @@ class FrameByFrame:
 
     Attributes:
         measured: By the distance that is measured in the frame itself: below 0 less both radii, below the buffer.
-        said: By the hazards that are open: as an operator sees it, with what keeps them from flickering.
+        said: By the hazards that are open: as an operator sees it, with what keeps them from flickering. Where they go
+            by probability, a warning is due while a breach is to come within the horizon.
     """
 
     measured: Answers
@@ -153,6 +154,29 @@ def answers_of(gap_m: FloatArray, buffer_m: float) -> IntArray:
     return np.where(gap_m < 0.0, DANGER, np.where(gap_m < buffer_m, WARNING, clear))
 
 
+def answers_ahead_of(gap_m: FloatArray, time_s: FloatArray, horizon_s: float) -> IntArray:
+    """Return (F, P) the answers that gaps call for where a warning is of what will be: a breach within the horizon.
+
+    Args:
+        gap_m: (F, P) distance less both radii; NaN where not known, which is no breach.
+        time_s: (F,) rising.
+        horizon_s: How far ahead.
+
+    Returns:
+        Unknown where the frames end before the horizon and show no breach until then.
+
+    >>> gap_m = np.array([[3.0], [2.0], [-0.5], [1.0], [1.0], [1.0]])
+    >>> [ANSWERS[k] for k in answers_ahead_of(gap_m, np.arange(6.0), 1.0)[:, 0]]
+    ['clear', 'warning', 'danger', 'clear', 'clear', 'unknown']
+    """
+    ends = np.searchsorted(time_s, time_s + horizon_s, side="right")
+    breached = gap_m < 0.0
+    so_far = np.concatenate([np.zeros((1, gap_m.shape[1]), dtype=np.int64), np.cumsum(breached, axis=0)])
+    will = so_far[ends] - so_far[:-1] > 0
+    known = will | (time_s + horizon_s <= time_s[-1])[:, None]
+    return np.where(breached, DANGER, np.where(will, WARNING, np.where(known, CLEAR, UNKNOWN)))
+
+
 def both_radii_m(clip: Clip, settings: Settings) -> FloatArray:
     """Return (P,) the sum of the action radii of each pair of the clip."""
     classes = [CLASSES[class_id] for class_id in clip.class_id]
@@ -171,10 +195,14 @@ def score_frames(clip: Clip, watched: Watched, settings: Settings) -> FrameByFra
     """Score what was said of every visible pair in every frame."""
     asked = seen_together(clip) & (clip.distance_m <= UP_TO_M)
     radii_m, buffer_m = both_radii_m(clip, settings), settings.hazard.buffer_m
-    true = answers_of(clip.distance_m - radii_m, buffer_m)[asked]
-    measured = answers_of(watched.distance_m - radii_m, buffer_m)
+    true_gap_m = clip.distance_m - radii_m
+    true, measured = answers_of(true_gap_m, buffer_m), answers_of(watched.distance_m - radii_m, buffer_m)
     said = np.where(measured == UNKNOWN, UNKNOWN, _as_said(watched.said))
-    return FrameByFrame(Answers.of(true, measured[asked]), Answers.of(true, said[asked]))
+    due = true
+    if settings.hazard.rule == "probability":
+        due = answers_ahead_of(true_gap_m, watched.time_s, settings.proximity.horizon_s)
+    told = asked & (due != UNKNOWN)
+    return FrameByFrame(Answers.of(true[asked], measured[asked]), Answers.of(due[told], said[told]))
 
 
 def _as_said(said: TextArray) -> IntArray:
