@@ -263,3 +263,46 @@ def test_a_camera_that_is_silent_makes_everything_unknown_within_a_second() -> N
 def test_a_camera_that_never_told_anything_is_unknown_too() -> None:
     silence = monitor().tick(5.0, "no picture arrives", "gate")
     assert (silence.stream_id, [event.rule for event in silence.hazards]) == ("gate", ["measurement"])
+
+
+@pytest.mark.parametrize("detect_every", [1, 3])
+@pytest.mark.parametrize("near_m", [None, 0.0])
+def test_overlapping_changes_nothing_but_the_time_it_takes(detect_every: int, near_m: float | None) -> None:
+    kept = []
+    for overlaps in (False, True):
+        memory, watched = Memory(), monitor(detect_every=detect_every)
+        watched.detect_near_m = near_m
+        yielded = list(Run(Film(25), watched, {"memory": memory}, overlaps=overlaps))
+        assert [result.frame.index for result in yielded] == [result.frame.index for result in memory.results]
+        kept.append(memory)
+    for one, other in zip(kept[0].results, kept[1].results, strict=True):
+        assert (one.frame.index, one.detected, len(one.hazards)) == (
+            other.frame.index,
+            other.detected,
+            len(other.hazards),
+        )
+        for part in ("tracks", "positions", "proximities"):
+            for column, values in getattr(one, part).columns().items():
+                np.testing.assert_array_equal(values, getattr(other, part).columns()[column], err_msg=column)
+    assert [one.outcomes[0].status for one in kept] == ["complete"] * 2
+
+
+def test_what_breaks_ahead_is_told_in_its_turn() -> None:
+    memory = Memory()
+    film = Film(10, broken_after=4)
+    with pytest.raises(SourceTruncated):
+        list(Run(film, monitor(), {"memory": memory}, overlaps=True))
+    assert [result.frame.index for result in memory.results] == [0, 1, 2, 3]
+    assert (memory.outcomes[0].status, film.closed) == ("failed", True)
+
+
+def test_a_run_that_is_stopped_while_it_looks_ahead_writes_what_it_began_and_ends() -> None:
+    memory, film = Memory(), Film(1000)
+    results = iter(Run(film, monitor(), {"memory": memory}, overlaps=True))
+    for _ in range(3):
+        last = next(results)
+    results.close()
+    assert memory.outcomes[0].status == "interrupted" and film.closed
+    written = [result.frame.index for result in memory.results]
+    assert written == [*range(len(written))] and last.frame.index < len(written) <= last.frame.index + 2
+    assert film.shown < 10

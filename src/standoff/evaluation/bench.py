@@ -91,7 +91,7 @@ def bench_source(
     """
     with TemporaryDirectory() as folder:
         drawing = {"drawing": DrawingSink(settings.video)} if "video" in settings.outputs else {}
-        run = open_run(source, Path(folder) / "run", settings, more_sinks=drawing)
+        run = open_run(source, Path(folder) / "run", settings, more_sinks=drawing, overlaps=False)
         described = dict(run.source.description)
         stages = collect_times(run, frames)
     return BenchReport(

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from threading import Lock
 from time import perf_counter
 from typing import Any
 
@@ -40,6 +41,19 @@ _AHEAD_S = 1.0
 """A gap that closes counts as what it will be then."""
 
 
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """What the detector saw in a frame, and how long it looked.
+
+    Attributes:
+        detections: All of it.
+        stage_ms: Milliseconds, by stage.
+    """
+
+    detections: Detections
+    stage_ms: Mapping[str, float]
+
+
 @dataclass
 class Monitor:
     """One stream's stages and what they know of it: neither where frames come from nor where results go.
@@ -69,6 +83,7 @@ class Monitor:
     open_hazards: OpenHazards = field(default_factory=OpenHazards)
     _last: FrameResult | None = None
     _is_near: bool = False
+    _looking: Lock = field(default_factory=Lock)
 
     @property
     def stages(self) -> dict[str, Stage]:
@@ -93,15 +108,29 @@ class Monitor:
         for stage in self.stages.values():
             stage.prepare(size_px)
 
-    def step(self, frame: Frame) -> FrameResult:
-        """Take one frame through all stages."""
+    def looks_at(self, number: int, frame: Frame) -> bool:
+        """Return whether the detector runs on the `number`-th frame of the stream, from 0, wherever anybody is."""
+        return number % self.detect_every == 0 and not self.detector.rests(frame)
+
+    def look(self, frame: Frame) -> Seen:
+        """Let the detector look at a frame: before `step`, perhaps in another thread."""
         stage_ms: dict[str, float] = {}
-        detections = Detections.empty()
-        wanted = self._is_near or self.counts.rows["frames"] % self.detect_every == 0
-        detected = wanted and not self.detector.rests(frame)
-        if detected:
-            with clocked(stage_ms, "detect"):
-                detections = self.detector.detect(frame)
+        with self._looking, clocked(stage_ms, "detect"):
+            detections = self.detector.detect(frame)
+        return Seen(detections, stage_ms)
+
+    def step(self, frame: Frame, seen: Seen | None = None) -> FrameResult:
+        """Take one frame through all stages.
+
+        Args:
+            frame: In the order of time.
+            seen: What `look` found in it, where somebody looked already.
+        """
+        if seen is None and (self.looks_at(self.counts.rows["frames"], frame) or self._is_near_and_seen(frame)):
+            seen = self.look(frame)
+        detected = seen is not None
+        detections = Detections.empty() if seen is None else seen.detections
+        stage_ms = {} if seen is None else dict(seen.stage_ms)
         with clocked(stage_ms, "motion"):
             motion = self.motion.update(frame, detections)
         with clocked(stage_ms, "ground"):
@@ -171,6 +200,9 @@ class Monitor:
     def describe(self) -> dict[str, Any]:
         """Return what the stages say of themselves so far, for the record."""
         return {name: stage.description for name, stage in self.stages.items()}
+
+    def _is_near_and_seen(self, frame: Frame) -> bool:
+        return self._is_near and not self.detector.rests(frame)
 
     def _note(self, hazards: tuple[Hazard, ...]) -> None:
         self.open_hazards = self.open_hazards.after(hazards)

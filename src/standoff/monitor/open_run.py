@@ -29,6 +29,7 @@ def open_run(
     overwrite: bool = False,
     checked: Callable[[], str] | None = None,
     more_sinks: Mapping[str, Sink] | None = None,
+    overlaps: bool = True,
 ) -> Run:
     """Open the source, build the monitor, then prepare the folder: nothing is written if anything is wrong.
 
@@ -38,6 +39,7 @@ def open_run(
         settings: What to run.
         overwrite: Replace the files of an earlier run in the folder.
         more_sinks: Beside those of the settings, and before them.
+        overlaps: As of `Run`.
         checked: For the report, after the last frame: how true the stated errors are, where truth is known.
 
     Raises:
@@ -85,7 +87,7 @@ def open_run(
         with suppress(OutputError):
             folder.finish(Outcome("failed", str(refused)), {})
         raise refused from error
-    return Run(frames, monitor, {**(more_sinks or {}), **own, **extra}, folder)
+    return Run(frames, monitor, {**(more_sinks or {}), **own, **extra}, folder, overlaps=overlaps)
 
 
 def _refuse_to_replace(source: Path, out: Path, what: str) -> None:

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import logging
 from collections import defaultdict
-from collections.abc import Generator, Iterator, Mapping
+from collections.abc import Generator, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import closing
 from dataclasses import replace
 from typing import Any
 
 from standoff.core.durations import Durations
 from standoff.core.errors import OutputError
 from standoff.core.protocols import Described, Sink, Source
-from standoff.core.types import Frame, FrameResult, Outcome
+from standoff.core.types import FrameResult, Outcome
 from standoff.monitor.fan_out import FanOut
-from standoff.monitor.monitor import Monitor, clocked
+from standoff.monitor.look_ahead import Ahead, look_ahead, one_by_one
+from standoff.monitor.monitor import Monitor
 from standoff.monitor.run_folder import RunFolder, RunRecord
 
 STOPPED = "stopped before the end of the source"
@@ -29,6 +32,8 @@ class Run:
         monitor: Of this stream.
         sinks: By name; closed at the end, however it comes.
         folder: What holds the record, and is nobody else's while the run goes on; None: there is none.
+        overlaps: Read and detect one frame ahead and write one behind, in threads. Results and their order are the
+            same; the times of stages are longer, because they share the cores.
 
     Attributes:
         source: Where the frames come from.
@@ -42,8 +47,12 @@ class Run:
         monitor: Monitor,
         sinks: Mapping[str, Sink] | None = None,
         folder: RunFolder | None = None,
+        *,
+        overlaps: bool = False,
     ) -> None:
         self.source, self.monitor, self.folder = source, monitor, folder
+        self._overlaps = overlaps
+        self._time_s = 0.0
         self._fan_out = FanOut(sinks or {})
         self._stages: defaultdict[str, Durations] = defaultdict(Durations)
 
@@ -70,12 +79,9 @@ class Run:
 
     def __iter__(self) -> Generator[FrameResult, None, None]:
         """Yield each frame's result after the sinks have it, with their times; close everything however it ends."""
-        outcome, time_s, lost = Outcome("complete"), 0.0, ""
+        outcome, lost = Outcome("complete"), ""
         try:
-            frames = self.source.frames()
-            while (step := self._step(frames)) is not None:
-                time_s = step.frame.time_s
-                yield step
+            yield from self._overlapping() if self._overlaps else self._one_by_one()
         except (KeyboardInterrupt, GeneratorExit):
             outcome = Outcome("interrupted", STOPPED)
             raise
@@ -85,19 +91,38 @@ class Run:
             raise
         finally:
             try:
-                outcome = replace(outcome, hazards=self.monitor.close(time_s, lost=lost))
+                outcome = replace(outcome, hazards=self.monitor.close(self._time_s, lost=lost))
             finally:
                 self._end(outcome)
 
-    def _step(self, frames: Iterator[Frame]) -> FrameResult | None:
-        """Take the next frame all the way; None where there is none."""
-        read_ms: dict[str, float] = {}
-        with clocked(read_ms, "frames"):
-            frame = next(frames, None)
-        if frame is None:
-            return None
-        result = self.monitor.step(frame)
-        stage_ms = {**read_ms, **result.stage_ms, **self._fan_out.write(result)}
+    def _one_by_one(self) -> Generator[FrameResult, None, None]:
+        for ahead in one_by_one(self.source.frames()):
+            result = self._step(ahead)
+            yield self._timed(result, self._fan_out.write(result))
+
+    def _overlapping(self) -> Generator[FrameResult, None, None]:
+        """Do the same with the next frame read and the last one written meanwhile."""
+        with (
+            ThreadPoolExecutor(1, "write") as writer,
+            closing(look_ahead(self.source.frames(), self.monitor)) as frames,
+        ):
+            written: tuple[FrameResult, Future[dict[str, float]]] | None = None
+            for ahead in frames:
+                result = self._step(ahead)
+                before, written = written, (result, writer.submit(self._fan_out.write, result))
+                if before is not None:
+                    yield self._timed(before[0], before[1].result())
+            if written is not None:
+                yield self._timed(written[0], written[1].result())
+
+    def _step(self, ahead: Ahead) -> FrameResult:
+        self._time_s = ahead.frame.time_s
+        result = self.monitor.step(ahead.frame, ahead.seen)
+        return replace(result, stage_ms={**ahead.read_ms, **result.stage_ms})
+
+    def _timed(self, result: FrameResult, sink_ms: Mapping[str, float]) -> FrameResult:
+        """Count the times of a frame, and return its result with those of its sinks."""
+        stage_ms = {**result.stage_ms, **sink_ms}
         for stage, duration_ms in stage_ms.items():
             self._stages[stage].add(duration_ms)
         return replace(result, stage_ms=stage_ms)
