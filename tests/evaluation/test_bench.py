@@ -163,6 +163,8 @@ def test_a_source_is_timed_with_all_its_outputs_and_nothing_is_left_behind(
     assert report["stages"]["track"]["samples"] == 8
     assert {"sinks.drawing", "sinks.video", "sinks.tracks"} <= report["stages"].keys()
     assert report["machine"]["processor"]
+    assert report["whole"]["frames"] == 7
+    assert report["whole"]["frames_per_s"] > 0
     assert report["source"]["frames_expected"] == 12
     assert report["workload_1080p_10_tracks"].keys() == {"surveyed", "reference"}
     assert len(report["baselines"]) == (4 if kind == "video" else 3)

@@ -79,6 +79,12 @@ def _time_stages(source: Path, settings: Settings, frames: int, darknet: str | N
         rows = [_row(stage, spread) for stage, spread in times.by_stage().items()]
         rows += [_row("the monitor's own work", times.own_work()), _row("all", times.total())]
         print_table(f"{title} ({where}), ms a frame", ("stage", "median", "10 %", "90 %", "frames"), rows)
+    whole = report.whole
+    typer.echo(
+        f"All of it, outputs included, side by side: {whole.frames_per_s:.1f} frames a second; "
+        f"{whole.bound_frames_per_s:.1f} if no core ever waited ({whole.processor_s / whole.frames * 1e3:.0f} ms of "
+        f"processor time a frame, {whole.cores} cores)."
+    )
     rows = [
         (baseline.name, baseline.ours, f"{baseline.ours_ms.median_ms:.2f}", baseline.theirs,
          f"{baseline.theirs_ms.median_ms:.2f}", f"{baseline.ratio:.1f}")

@@ -17,7 +17,7 @@ from standoff.evaluation.bench_baselines import (
     ransac_baseline,
 )
 from standoff.evaluation.bench_workload import DrawingSink, monitor_workload
-from standoff.evaluation.timing import Baseline, StageTimes, collect_times, machine
+from standoff.evaluation.timing import Baseline, StageTimes, Throughput, collect_times, machine, time_through
 from standoff.monitor import open_run
 from standoff.stages.detect import OnnxDetector, find_model
 from standoff.stages.frames import open_source
@@ -36,6 +36,7 @@ class BenchReport:
         machine: Where.
         source: On what.
         stages: Each frame's times on the source.
+        whole: How fast all of it is, reading, detecting and writing side by side.
         workload: Each frame's times on the made-up site at 1080p with ten tracks, by kind of ground stage.
         baselines: Somebody else's times for the same work.
     """
@@ -43,6 +44,7 @@ class BenchReport:
     machine: dict[str, Any]
     source: dict[str, Any]
     stages: StageTimes
+    whole: Throughput
     workload: dict[str, StageTimes]
     baselines: tuple[Baseline, ...]
 
@@ -52,6 +54,7 @@ class BenchReport:
             "machine": self.machine,
             "source": self.source,
             **_times(self.stages),
+            "whole": self.whole.to_dict(),
             "workload_1080p_10_tracks": {kind: _times(times) for kind, times in self.workload.items()},
             "own_work_limit_ms": OWN_WORK_LIMIT_MS,
             "baselines": [baseline.to_dict() for baseline in self.baselines],
@@ -94,10 +97,12 @@ def bench_source(
         run = open_run(source, Path(folder) / "run", settings, more_sinks=drawing, overlaps=False)
         described = dict(run.source.description)
         stages = collect_times(run, frames)
+        whole = time_through(open_run(source, Path(folder) / "whole", settings), frames)
     return BenchReport(
         machine=machine(),
         source=described,
         stages=stages,
+        whole=whole,
         workload={
             "surveyed": monitor_workload(frames=workload_frames),
             "reference": monitor_workload(frames=workload_frames, ground="reference"),

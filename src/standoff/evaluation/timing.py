@@ -8,6 +8,7 @@ from collections.abc import Generator, Iterable, Mapping
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
+from time import perf_counter, process_time
 from typing import Any, Self
 
 import numpy as np
@@ -110,6 +111,67 @@ def collect_times(results: Iterable[FrameResult], most_frames: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
+class Throughput:
+    """How fast a whole run is, and how fast its work could be done at most.
+
+    Attributes:
+        frames: How many frames.
+        wall_s: How long they took.
+        processor_s: Time of all cores that this process used for them.
+        cores: How many it may use.
+    """
+
+    frames: int
+    wall_s: float
+    processor_s: float
+    cores: int
+
+    @property
+    def frames_per_s(self) -> float:
+        """Frames a second."""
+        return self.frames / self.wall_s
+
+    @property
+    def bound_frames_per_s(self) -> float:
+        """Frames a second if no core ever waited: the same work, spread evenly."""
+        return self.frames * self.cores / self.processor_s
+
+    def to_dict(self) -> dict[str, float]:
+        """Return plain values."""
+        return {
+            "frames": self.frames,
+            "frames_per_s": round(self.frames_per_s, 2),
+            "bound_frames_per_s": round(self.bound_frames_per_s, 2),
+            "processor_s": round(self.processor_s, 2),
+            "cores": self.cores,
+        }
+
+
+def time_through(results: Iterable[object], most: int | None = None) -> Throughput:
+    """Read results to the end, or up to `most` of them, and time all of it but the first, which warms up.
+
+    Raises:
+        ValueError: There are fewer than two.
+    """
+    iterator = iter(results)
+    if next(iterator, None) is None:
+        raise ValueError("no results to time")
+    wall_s, processor_s = perf_counter(), process_time()
+    frames = sum(1 for _ in islice(iterator, None if most is None else most - 1))
+    wall_s, processor_s = perf_counter() - wall_s, process_time() - processor_s
+    if isinstance(iterator, Generator):
+        iterator.close()
+    if not frames:
+        raise ValueError("one result is too few to time")
+    return Throughput(frames, wall_s, processor_s, usable_cores())
+
+
+def usable_cores() -> int:
+    """Return how many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@dataclass(frozen=True, slots=True)
 class Baseline:
     """Somebody else's way to do the same work on the same input, in the same run.
 
@@ -148,7 +210,7 @@ def machine() -> dict[str, Any]:
     """Name the machine: processor, cores that this process may use, how busy it was, versions."""
     return {
         "processor": _processor(),
-        "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count(),
+        "cores": usable_cores(),
         "load_1_min": round(os.getloadavg()[0], 2) if hasattr(os, "getloadavg") else None,
         "versions": library_versions(),
     }

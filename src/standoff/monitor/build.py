@@ -32,17 +32,18 @@ def _check_visible(settings: Settings, detector: Detector) -> None:
         )
 
 
-def build_monitor(settings: Settings, camera: CameraPrior | None = None) -> Monitor:
+def build_monitor(settings: Settings, camera: CameraPrior | None = None, detector: Detector | None = None) -> Monitor:
     """Make one stream's monitor; all state belongs to the objects made here.
 
     Args:
         settings: What to build.
         camera: What the source knows of its camera.
+        detector: In place of the configured one: a `SharedDetector` that other streams ask as well.
 
     Raises:
         StandoffError: A model, survey, camera or replacement that cannot be used.
     """
-    detector = build_stage("detect", settings)
+    detector = detector or build_stage("detect", settings)
     _check_visible(settings, detector)
     return Monitor(
         detector=detector,
