@@ -13,8 +13,8 @@ from pytest_benchmark.fixture import BenchmarkFixture
 from stages.sinks.fake_site import FakeSite
 
 from standoff.core.types import FrameResult, ImageArray, Outcome, Sink
+from standoff.drawing.encoder import VideoFile
 from standoff.stages.sinks import FRAMES, PROXIMITY, TRACKS, Composer, HazardSink, RecordSink, ReportSink, TableSink
-from standoff.stages.sinks.encoder import VideoFile
 from standoff.stages.sinks.scene import OpenHazards, Scene
 
 SIZE = (1920, 1080)

@@ -21,7 +21,7 @@ from standoff.core.types import (
     WatchedGround,
 )
 from standoff.core.zones import Zone
-from standoff.stages.sinks.palette import Tone, class_tone
+from standoff.drawing.palette import Tone, class_tone
 from standoff.stages.sinks.watched_shares import around_tracks, percent_text
 
 Pair = tuple[int, int]
