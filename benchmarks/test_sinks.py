@@ -14,8 +14,18 @@ from stages.sinks.fake_site import FakeSite
 
 from standoff.core.types import FrameResult, ImageArray, Outcome, Sink
 from standoff.drawing.encoder import VideoFile
-from standoff.stages.sinks import FRAMES, PROXIMITY, TRACKS, Composer, HazardSink, RecordSink, ReportSink, TableSink
-from standoff.stages.sinks.scene import OpenHazards, Scene
+from standoff.stages.sinks import (
+    FRAMES,
+    PROXIMITY,
+    TRACKS,
+    Composer,
+    HazardSink,
+    OpenHazards,
+    RecordSink,
+    ReportSink,
+    Scene,
+    TableSink,
+)
 
 SIZE = (1920, 1080)
 _Item = TypeVar("_Item")

@@ -35,12 +35,13 @@ from standoff.stages.sinks import (
     TRACKS,
     Composer,
     HazardSink,
+    OpenHazards,
     RecordSink,
     ReportSink,
+    Scene,
     TableSink,
     VideoParams,
 )
-from standoff.stages.sinks.scene import OpenHazards, Scene
 from standoff.stages.track import Tracker
 from standoff.stages.watched import GroundWatcher
 

@@ -16,8 +16,8 @@ from standoff.core.types import IntArray
 from standoff.evaluation.matching import NOTHING, match_boxes
 from standoff.evaluation.paper.clip_tables import read_table
 from standoff.evaluation.positions_input import TRACK_COLUMNS, Columns, chosen_rows, read_run_table
+from standoff.files.fingerprint import fingerprint
 from standoff.files.json_text import read_json
-from standoff.stages.frames.fingerprint import fingerprint
 from standoff.stages.ground import load_camera
 
 WHOLE, HIDDEN, CUT_OFF = range(3)

@@ -25,6 +25,7 @@ from pathlib import Path
 
 import numpy as np
 
+from standoff.core.assignment import assign
 from standoff.core.boxes import overlaps
 from standoff.core.errors import DataError
 from standoff.core.homography import FloatArray
@@ -39,7 +40,6 @@ from standoff.evaluation.positions_input import (
     read_run_table,
     read_truth,
 )
-from standoff.stages.track.association import assign
 
 NOTE = "Precision is a lower bound where not everybody is labelled. Missed truth and unmeasured pairs are counted."
 _MAX_GROUND_M = 2.0

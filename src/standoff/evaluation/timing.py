@@ -13,7 +13,7 @@ from typing import Any, Self
 import numpy as np
 
 from standoff.core.types import FrameResult
-from standoff.stages.sinks.record import library_versions
+from standoff.files.versions import library_versions
 
 NOT_OUR_WORK = frozenset({"frames", "detect", "sinks.video"})
 """Decoding, inference, and the sink that encodes video; drawing for it is timed as a sink of its own."""

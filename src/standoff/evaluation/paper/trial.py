@@ -17,9 +17,8 @@ from standoff.evaluation.paper.truth_detector import REFERENCE_MARGIN_PX, BoxErr
 from standoff.pipeline import Pipeline
 from standoff.stages.detect import RecordedDetector
 from standoff.stages.frames import Source
-from standoff.stages.ground import ReferenceShape, ScaleWatch
-from standoff.stages.ground.params import ReferenceMethod
-from standoff.stages.locate.params import Anchor, LocateParams
+from standoff.stages.ground import ReferenceMethod, ReferenceShape, ScaleWatch
+from standoff.stages.locate import Anchor, LocateParams
 from standoff.stages.proximity import ProximityParams
 
 CameraKnowledge = Literal["file", "unknown"]

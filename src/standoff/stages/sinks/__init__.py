@@ -5,6 +5,7 @@ from standoff.stages.sinks.hazards import HazardSink
 from standoff.stages.sinks.params import DrawParams, ReportParams, ShowParams, TableParams, VideoParams
 from standoff.stages.sinks.record import RecordSink
 from standoff.stages.sinks.report import ReportSink
+from standoff.stages.sinks.scene import OpenHazards, Scene
 from standoff.stages.sinks.tables import (
     DETECTIONS,
     FRAMES,
@@ -27,9 +28,11 @@ __all__ = [
     "Composer",
     "DrawParams",
     "HazardSink",
+    "OpenHazards",
     "RecordSink",
     "ReportParams",
     "ReportSink",
+    "Scene",
     "ShowParams",
     "Table",
     "TableParams",
