@@ -26,7 +26,8 @@ PUBLIC_NAMES = {
         "ReferenceShape", "ScaleWatch", "SurveyedGround", "TelemetryPose", "Unmapped", "belief_from_points",
         "calibrate", "calibrate_views", "canny", "check_square", "find_corners", "find_markers", "fit_points",
         "line_through", "load_camera", "load_survey", "map_from_view", "marker_pattern", "ransac_contours",
-        "read_boards", "rectified_scale_m_per_px", "sample_pairs", "save_camera", "scale_from_sizes", "SizesEstimator", "unit_hint", "sobel_gradients",
+        "read_boards", "rectified_scale_m_per_px", "sample_pairs", "save_camera", "scale_from_sizes",
+        "SizesEstimator", "sobel_gradients", "unit_hint",
         "view_from_telemetry",
     },
     "standoff.clips": {
