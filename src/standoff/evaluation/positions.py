@@ -25,6 +25,7 @@ from pathlib import Path
 
 import numpy as np
 
+from standoff.clips import Columns, chosen_rows
 from standoff.core.assignment import assign
 from standoff.core.boxes import overlaps
 from standoff.core.errors import DataError
@@ -35,8 +36,6 @@ from standoff.evaluation.pair_rows import distances_of
 from standoff.evaluation.positions_input import (
     PAIR_COLUMNS,
     TRACK_COLUMNS,
-    Columns,
-    chosen_rows,
     read_run_table,
     read_truth,
 )
