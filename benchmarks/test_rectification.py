@@ -9,9 +9,7 @@ import pytest
 
 from standoff.evaluation.drawn_quadrilaterals import draw_scene
 from standoff.evaluation.rectification import METHODS, paper_edges, ransac_by_loop
-from standoff.stages.ground.lines import ransac_contours, sample_pairs
-from standoff.stages.ground.outline import OutlineFinder
-from standoff.stages.ground.params import ReferenceMethod, ReferenceParams
+from standoff.stages.ground import OutlineFinder, ReferenceMethod, ReferenceParams, ransac_contours, sample_pairs
 
 SCENE = draw_scene("sand", 0)
 

@@ -14,9 +14,8 @@ from stages.sinks.fake_site import FakeSite
 
 from standoff.core.protocols import Sink
 from standoff.core.types import FrameResult, ImageArray, Outcome
-from standoff.stages.sinks import FRAMES, PROXIMITY, TRACKS, Composer, HazardSink, ReportSink, TableSink
-from standoff.stages.sinks.encoder import VideoFile
-from standoff.stages.sinks.scene import Scene
+from standoff.drawing.encoder import VideoFile
+from standoff.stages.sinks import FRAMES, PROXIMITY, TRACKS, Composer, HazardSink, ReportSink, Scene, TableSink
 
 SIZE = (1920, 1080)
 _Item = TypeVar("_Item")

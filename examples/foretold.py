@@ -30,8 +30,7 @@ from standoff.simulation.motion import sample
 from standoff.simulation.people.anthropometry import MEAN_STATURE_M
 from standoff.stages.hazard import HazardMonitor, HazardParams
 from standoff.stages.locate import Locator
-from standoff.stages.proximity import ProximityMeter, ProximityParams
-from standoff.stages.proximity.excuses import Excuses
+from standoff.stages.proximity import Excuses, ProximityMeter, ProximityParams
 
 CLIP_S, STEP_S = 120.0, 0.2
 PX_PER_M, SIZE_PX, MIDDLE_M = 100.0, (40_000, 40_000), 200.0

@@ -15,7 +15,7 @@ from standoff.core.homography import FloatArray
 from standoff.core.pose import View
 from standoff.core.types import Detections, Frame, GroundMap, NoCameraMotion
 from standoff.evaluation.drawn_quadrilaterals import DIFFICULTIES, SIZE_PX, Difficulty, draw_scene
-from standoff.stages.frames.pictures import ArrayPicture
+from standoff.stages.frames import ArrayPicture
 from standoff.stages.ground import FusedGround, FusedParams, Reference, ReferenceParams, ReferenceShape
 
 _MIDDLE = (SIZE_PX - 1) / 2.0

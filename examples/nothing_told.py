@@ -18,7 +18,7 @@ from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.homography import FloatArray
 from standoff.core.pose import View
 from standoff.core.types import CameraMotion, Detections, Frame, GroundMap
-from standoff.stages.frames.pictures import ArrayPicture
+from standoff.stages.frames import ArrayPicture
 from standoff.stages.ground import FusedGround, load_camera
 
 _PAIR = np.array([[0.42, 0.6], [0.58, 0.6]])

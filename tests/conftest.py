@@ -1,8 +1,10 @@
 from __future__ import annotations
 
 import os
+import shutil
 from pathlib import Path
 
+import drawn_clip
 import pytest
 from hypothesis import settings
 from laws import FUZZ, forget_our_constants, register_profiles
@@ -42,3 +44,15 @@ def opengl() -> None:
         if os.environ.get("REQUIRE_EGL") == "1":
             raise
         pytest.skip(str(error))
+
+
+@pytest.fixture(scope="session")
+def clip_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A drawn clip; never changed by a test."""
+    return drawn_clip.write_clip(tmp_path_factory.mktemp("clips") / "drawn")
+
+
+@pytest.fixture
+def copy_of(clip_folder: Path, tmp_path: Path) -> Path:
+    """A drawn clip of a test's own."""
+    return Path(shutil.copytree(clip_folder, tmp_path / "copy"))

@@ -13,7 +13,7 @@ from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.map_error import map_jacobian
 from standoff.core.pose import View
 from standoff.core.types import CameraMotion, GroundMap, ImageArray
-from standoff.stages.ground.shape import ReferenceShape
+from standoff.stages.ground import ReferenceShape
 from standoff.stages.ground.solid import SolidState
 
 SIZE_PX = (640, 360)

@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 from tolerances import CODED_FRAME_LEVELS, SCENE_DISTANCE_M
 
+from standoff.clips import Clip, load_clip
 from standoff.config import load_settings
 from standoff.core.classes import CLASSES
 from standoff.core.homography import FloatArray
 from standoff.core.types import ImageArray
-from standoff.evaluation.paper import Clip, load_clip
 from standoff.monitor import open_run
 from standoff.stages.frames import open_source
 

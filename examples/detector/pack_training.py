@@ -29,6 +29,7 @@ from typing import Any
 
 from standoff import __version__
 from standoff.core.errors import ConfigError, DataError, MissingDependency, ModelError, OutputError, StandoffError
+from standoff.files.fingerprint import file_sha256
 from standoff.files.json_text import plain
 from standoff.files.whole import whole_file
 from standoff.files.yaml_text import dump_yaml
@@ -38,7 +39,6 @@ from standoff.labels.mixture import is_mixture, read_mixture
 from standoff.labels.regions import OWN_REGIONS
 from standoff.labels.splits import require_splits
 from standoff.stages.detect import SHIPPED_MODELS
-from standoff.stages.detect.model_card import file_sha256
 from standoff.training.architectures import ARCHITECTURES
 from standoff.training.run.plan import make_plan, read_plan
 

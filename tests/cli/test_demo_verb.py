@@ -4,12 +4,12 @@ import json
 import shutil
 from pathlib import Path
 
+import drawn_clip
 import pytest
 from cli.calling import Call
-from evaluation.paper import drawn_clip
 from evaluation.paper.test_paper_recorded import record_truth
 
-from standoff.evaluation.paper import Clip, load_clip
+from standoff.clips import Clip, load_clip
 from standoff.evaluation.paper.truth_detector import TrueBoxes
 
 pytestmark = pytest.mark.live  # each goes through a whole film

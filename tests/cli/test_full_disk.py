@@ -83,7 +83,7 @@ def test_a_film_without_room_ends_in_a_line_and_never_in_the_death_of_the_proces
 import resource, signal
 import numpy as np
 from pathlib import Path
-from standoff.stages.sinks.encoder import VideoFile
+from standoff.drawing.encoder import VideoFile
 film = VideoFile(Path({str(tmp_path / "film.mp4")!r}), (640, 360), preset="ultrafast")
 resource.setrlimit(resource.RLIMIT_FSIZE, ({size}, {size}))
 noise, failed = np.random.default_rng(0), 0

@@ -14,8 +14,7 @@ from standoff.core.errors import DataError, GroundError
 from standoff.core.types import Frame, ImageArray
 from standoff.labels import LabelledData, read_data
 from standoff.stages.frames import open_source
-from standoff.stages.ground.camera_file import load_camera
-from standoff.stages.ground.survey_file import load_survey
+from standoff.stages.ground import load_camera, load_survey
 
 pytestmark = pytest.mark.shared
 _CODING = 6.0

@@ -10,8 +10,8 @@ import pyarrow as pa
 import pyarrow.parquet
 from scipy.spatial.distance import pdist
 
+from standoff.clips import Columns
 from standoff.core.homography import FloatArray
-from standoff.evaluation.positions_input import Columns
 
 FRAMES = 6
 STANDING_M = np.array([[0.0, 0.0], [3.0, 0.0], [3.0, 4.0], [40.0, 0.0]])

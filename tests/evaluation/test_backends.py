@@ -18,10 +18,7 @@ from standoff.evaluation.backends import (
     compare_answers,
     compare_providers,
 )
-from standoff.stages.detect import available_providers
-from standoff.stages.detect.candidates import Candidates
-from standoff.stages.detect.network import Network
-from standoff.stages.detect.params import Provider
+from standoff.stages.detect import Candidates, Network, Provider, available_providers
 from standoff.stages.frames import frame_from_array
 
 PLACE_SHARES = np.array([[0.1, 0.2, 0.4, 0.8], [0.5, 0.5, 0.6, 0.7], [0.0, 0.0, 1.0, 1.0]])

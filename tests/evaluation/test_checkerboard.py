@@ -12,8 +12,7 @@ from standoff.core.errors import DataError, GroundError, OutputError, SourceErro
 from standoff.core.homography import FloatArray
 from standoff.evaluation.checkerboard import accuracy_percent, evaluate_checkerboard, evaluate_views, first_corner_first
 from standoff.evaluation.checkerboard_figure import checkerboard_figure
-from standoff.stages.ground.boards import BoardView
-from standoff.stages.ground.camera_file import load_camera
+from standoff.stages.ground import BoardView, load_camera
 
 _MATRIX = np.array([[700.0, 0, 320.0], [0, 700.0, 240.0], [0, 0, 1]])
 _PINHOLE = Camera(640, 480, _MATRIX, np.zeros(5))

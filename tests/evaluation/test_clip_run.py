@@ -4,11 +4,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
+import drawn_clip
 import numpy as np
 import pytest
 from evaluation.blind_detector import BlindDetector
-from evaluation.paper import drawn_clip
 
+from standoff.clips import Clip, load_clip
 from standoff.config import Settings, load_settings
 from standoff.core import protocols
 from standoff.core.errors import DataError
@@ -16,7 +17,6 @@ from standoff.core.homography import FloatArray
 from standoff.core.protocols import Detector
 from standoff.core.types import Detections, Frame
 from standoff.evaluation.clip_run import ClipScore, ClipWitness, Encounter
-from standoff.evaluation.paper import Clip, load_clip
 from standoff.evaluation.paper.truth_detector import TrueBoxes
 from standoff.monitor import open_run
 

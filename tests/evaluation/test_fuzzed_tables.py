@@ -13,10 +13,9 @@ from hypothesis import strategies as st
 from laws import examples
 from mutations import mutated
 
-from standoff.clips import read_detections
+from standoff.clips import read_clip_table, read_detections
 from standoff.clips.detections import COLUMNS, metadata_of
 from standoff.core.errors import DataError
-from standoff.evaluation.paper.clip_tables import TRUTH, read_table
 from standoff.evaluation.positions_input import TRACK_COLUMNS, read_run_table, read_truth
 
 _TRUTH_CSV = b"frame,id,x,y,w,h,conf,X,Y\n" + b"".join(
@@ -24,6 +23,7 @@ _TRUTH_CSV = b"frame,id,x,y,w,h,conf,X,Y\n" + b"".join(
     for frame in range(1, 5)
     for person in (1, 2)
 )
+_TRUTH = ("frame", "entity_id", "class_id", "x_m", "y_m", "x1_px", "y1_px", "x2_px", "y2_px", "foot_x_px", "foot_y_px")
 
 
 def _detections() -> pa.Table:
@@ -51,7 +51,7 @@ def _detections() -> pa.Table:
 def _truth() -> pa.Table:
     rows = np.arange(6.0)
     return pa.table(
-        {name: rows.astype(np.int64) if name in ("frame", "entity_id", "class_id") else rows for name in TRUTH}
+        {name: rows.astype(np.int64) if name in ("frame", "entity_id", "class_id") else rows for name in _TRUTH}
     )
 
 
@@ -80,7 +80,7 @@ def read(path: Path, kind: str) -> int:
     if kind == "detections":
         return len(read_detections(path).detections)
     if kind == "truth":
-        return len(read_table(path, TRUTH)["frame"])
+        return len(read_clip_table(path.parent, path.name, _TRUTH)["frame"])
     return len(read_run_table(path, TRACK_COLUMNS)["frame"])
 
 

@@ -14,9 +14,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from laws import examples
 
+from standoff.clips import Columns, chosen_rows
 from standoff.core.errors import DataError
 from standoff.evaluation.positions import PositionsResult, score_positions
-from standoff.evaluation.positions_input import Columns, chosen_rows
 
 
 def score(truth: Columns, tracks: Columns, **options: Any) -> PositionsResult:

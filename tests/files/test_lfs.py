@@ -15,7 +15,7 @@ from standoff.labels.pictures import canvas_of
 from standoff.labels.source import BadPicture
 from standoff.stages.detect import OnnxDetector
 from standoff.stages.frames import open_source
-from standoff.stages.ground.boards import read_boards
+from standoff.stages.ground import read_boards
 
 READERS: dict[str, tuple[str, Callable[[Path], object]]] = {
     "model": ("m.onnx", OnnxDetector),

@@ -9,10 +9,10 @@ import pyarrow as pa
 import pytest
 from scipy.special import expit, logit
 
+from standoff.clips import NOISY_DETECTIONS_SCHEMA
 from standoff.core.classes import CLASSES
 from standoff.core.homography import FloatArray
 from standoff.simulation.detection_noise import (
-    DETECTIONS_SCHEMA,
     GROUPS,
     LEAST_SCORE,
     NOISE,
@@ -58,8 +58,8 @@ def test_a_detector_without_errors_finds_the_truth() -> None:
     (row,) = NoisyDetector(_SIZE_PX, np.random.default_rng(0), exact).detect(7, 0.5, [_worker()])
     assert [row[side] for side in _SIDES] == [600.0, 300.0, 624.0, 348.0]
     assert (row["frame"], row["time_s"], row["class"], row["class_id"]) == (7, 0.5, "worker", 0)
-    assert list(row) == DETECTIONS_SCHEMA.names
-    pa.Table.from_pylist([row], schema=DETECTIONS_SCHEMA)
+    assert list(row) == NOISY_DETECTIONS_SCHEMA.names
+    pa.Table.from_pylist([row], schema=NOISY_DETECTIONS_SCHEMA)
 
 
 @pytest.mark.parametrize("share", [1.0, 0.5, 0.2])

@@ -10,11 +10,11 @@ import pytest
 from laws import seeds
 from tolerances import GEOMETRY_REL
 
+from standoff.clips import CLIP_FORMAT, CLIP_FRAMES_SCHEMA, PAIRS_SCHEMA, TRUTH_SCHEMA
 from standoff.config import load_settings
 from standoff.core.errors import OutputError
 from standoff.simulation.presets import Plan, plan_clip
-from standoff.simulation.record import FORMAT, frame_times_s, record_clip
-from standoff.simulation.truth import FRAMES_SCHEMA, PAIRS_SCHEMA, TRUTH_SCHEMA
+from standoff.simulation.record import frame_times_s, record_clip
 from standoff.stages.frames import open_source
 from standoff.stages.ground import load_camera
 
@@ -39,7 +39,7 @@ def clip(opengl: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_a_clip_has_every_file_and_its_tables_every_column(clip: Path) -> None:
     assert {path.name for path in clip.iterdir()} == _FILES
-    for name, schema in (("truth", TRUTH_SCHEMA), ("pairs", PAIRS_SCHEMA), ("frames", FRAMES_SCHEMA)):
+    for name, schema in (("truth", TRUTH_SCHEMA), ("pairs", PAIRS_SCHEMA), ("frames", CLIP_FRAMES_SCHEMA)):
         table = pq.read_table(clip / f"{name}.parquet")
         assert table.schema.equals(schema)
         assert sorted(set(table["frame"].to_pylist())) == list(range(_FRAMES))
@@ -54,7 +54,7 @@ def test_the_monitor_reads_its_video_camera_and_reference(clip: Path) -> None:
     assert (camera.width_px, camera.height_px) == (320, 180)
     settings = load_settings(clip / "reference.yaml")
     scene = json.loads((clip / "scene.json").read_text())
-    assert scene["format"] == FORMAT
+    assert scene["format"] == CLIP_FORMAT
     assert settings.ground.reference is not None
     top_m = np.array(scene["reference"]["top_m"])
     np.testing.assert_allclose(settings.ground.reference.shape().corners_m, top_m[:, :2], rtol=GEOMETRY_REL)

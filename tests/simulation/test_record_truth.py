@@ -12,17 +12,15 @@ import pyarrow.parquet as pq
 import pytest
 from tolerances import GEOMETRY_REL
 
+from standoff.clips import CLIP_FRAMES_SCHEMA, DEVICES_SCHEMA, NOISY_DETECTIONS_SCHEMA, PAIRS_SCHEMA, TRUTH_SCHEMA
 from standoff.config import load_settings
 from standoff.core.homography import FloatArray
-from standoff.simulation.detection_noise import DETECTIONS_SCHEMA
 from standoff.simulation.presets import Plan, plan_clip
 from standoff.simulation.record import record_cameras, record_clip, record_truth
-from standoff.simulation.truth import FRAMES_SCHEMA, PAIRS_SCHEMA, TRUTH_SCHEMA
-from standoff.simulation.wearables import DEVICES_SCHEMA
 
 _FRAMES = 3
 _SCHEMAS = {
-    "truth": TRUTH_SCHEMA, "pairs": PAIRS_SCHEMA, "frames": FRAMES_SCHEMA, "detections": DETECTIONS_SCHEMA,
+    "truth": TRUTH_SCHEMA, "pairs": PAIRS_SCHEMA, "frames": CLIP_FRAMES_SCHEMA, "detections": NOISY_DETECTIONS_SCHEMA,
     "devices": DEVICES_SCHEMA,
 }  # fmt: skip
 _FILES = {*(f"{name}.parquet" for name in _SCHEMAS), "scene.json", "camera.yaml", "reference.yaml", "telemetry.srt"}

@@ -7,6 +7,7 @@ from laws import seeds
 from pycocotools import mask as coco_mask
 from tolerances import HULL_BOX_PX
 
+from standoff.clips import PAIRS_SCHEMA, TRUTH_SCHEMA
 from standoff.core.camera import Camera
 from standoff.core.pose import View
 from standoff.simulation.coco import Annotations
@@ -14,8 +15,6 @@ from standoff.simulation.mesh import ball, box, rotation, srgb, translation
 from standoff.simulation.moment import Body, Moment
 from standoff.simulation.scene import place
 from standoff.simulation.truth import (
-    PAIRS_SCHEMA,
-    TRUTH_SCHEMA,
     entity_rows,
     full_box_px,
     mask_counts,

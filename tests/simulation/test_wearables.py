@@ -6,6 +6,7 @@ import pytest
 from simulation.flat_ground import FlatGround
 from tolerances import GEOMETRY_REL
 
+from standoff.clips import DEVICES_SCHEMA
 from standoff.core.camera import Camera
 from standoff.core.homography import FloatArray
 from standoff.simulation.behaviour import idle, walking_past
@@ -18,7 +19,6 @@ from standoff.simulation.scene import Actor, Batch, Scene, place
 from standoff.simulation.telemetry import Origin
 from standoff.simulation.truth import Row
 from standoff.simulation.wearables import (
-    DEVICES_SCHEMA,
     DRIFT_M,
     JITTER_S,
     NEAR_FACTOR,

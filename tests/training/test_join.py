@@ -11,8 +11,8 @@ from square_detector import SIZE_PX, draw_squares, write_detector
 from training.start.test_blend import write_weights
 
 from standoff.core.errors import ConfigError, ModelError, StandoffError
-from standoff.stages.detect import OnnxDetector
-from standoff.stages.detect.model_card import INPUT_NAME, OUTPUT_NAME, POINTS_NAME, ModelCard, file_sha256
+from standoff.files.fingerprint import file_sha256
+from standoff.stages.detect import BOXES_OUTPUT, PICTURE_INPUT, POINTS_OUTPUT, ModelCard, OnnxDetector
 from standoff.stages.frames import frame_from_array
 from standoff.training import export_darknet
 from standoff.training.architectures.refitted import pointed_cfg
@@ -39,7 +39,7 @@ def write_models(folder: Path, *seeds: int, size_px: tuple[int, int] | None = No
 
 def _rows(model: Path, picture: np.ndarray) -> np.ndarray:
     session = onnxruntime.InferenceSession(str(model), providers=["CPUExecutionProvider"])
-    return np.asarray(session.run(None, {INPUT_NAME: picture})[0])
+    return np.asarray(session.run(None, {PICTURE_INPUT: picture})[0])
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -82,12 +82,12 @@ def test_points_stay_with_the_rows_of_the_part_that_gives_them(tmp_path: Path) -
         onnxruntime.InferenceSession(str(path), providers=["CPUExecutionProvider"])
         for path in (tmp_path / "points.onnx", tmp_path / "joined.onnx")
     )
-    (own,), (joined,) = (session.run([POINTS_NAME], {INPUT_NAME: picture}) for session in sessions)
+    (own,), (joined,) = (session.run([POINTS_OUTPUT], {PICTURE_INPUT: picture}) for session in sessions)
     rows = own.shape[1]
     np.testing.assert_array_equal(joined[:, -rows:], own)
     assert np.isnan(joined[:, :-rows]).all()
     join_models([(plain, {}), (other, {})], tmp_path / "without.onnx")
-    assert [output.name for output in onnx.load(str(tmp_path / "without.onnx")).graph.output] == [OUTPUT_NAME]
+    assert [output.name for output in onnx.load(str(tmp_path / "without.onnx")).graph.output] == [BOXES_OUTPUT]
 
 
 def test_the_card_names_every_part(tmp_path: Path) -> None:

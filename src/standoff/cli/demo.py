@@ -12,8 +12,8 @@ from standoff.cli.run import detector_overrides, exit_status, tell, watch
 from standoff.core.errors import DataError
 
 if TYPE_CHECKING:
+    from standoff.clips import Clip
     from standoff.evaluation.clip_run import ClipWitness
-    from standoff.evaluation.paper import Clip
 
 
 def demo(
@@ -41,7 +41,7 @@ def demo(
     quiet = str(json_file) == "-"
     clip = _load_film()
     # As a user would: the film's own description of its reference object and camera, and defaults for all else.
-    settings = load_settings(clip.folder / "reference.yaml", detector_overrides(model, detections))
+    settings = load_settings(clip.settings_file, detector_overrides(model, detections))
     run = open_run(clip.video, out, settings, overwrite=overwrite, checked=lambda: _checked(witness))
     witness = ClipWitness(clip, settings, run.source.size_px)
     watch(run, quiet=quiet, on_result=witness.take)
@@ -77,7 +77,7 @@ def _load_film() -> Clip:
     Raises:
         DataError: The installation lacks part of it.
     """
-    from standoff.evaluation.paper import load_clip
+    from standoff.clips import load_clip
 
     try:
         return load_clip(_folder())
@@ -87,7 +87,9 @@ def _load_film() -> Clip:
 
 def find_film() -> Path:
     """Return the video that comes with standoff."""
-    return _folder() / "video.mp4"
+    from standoff.clips import VIDEO_FILE
+
+    return _folder() / VIDEO_FILE
 
 
 def _folder() -> Path:

@@ -150,10 +150,12 @@ def _evaluate_all(
     folders: Sequence[Path], plans: Mapping[Path, Plan], trial: Trial
 ) -> tuple[list[ClipResult], dict[str, StandoffError]]:
     """Evaluate every clip that can be; render first what is planned and not there."""
+    from standoff.clips import SCENE_FILE
+
     results, failures = [], {}
     for folder in folders:
         try:
-            if folder in plans and not (folder / "scene.json").is_file():
+            if folder in plans and not (folder / SCENE_FILE).is_file():
                 _render(plans[folder], folder)
             results.append(_evaluate(folder, trial))
         except StandoffError as error:
@@ -174,7 +176,8 @@ def _render(plan: Plan, folder: Path) -> None:
 
 def _evaluate(folder: Path, trial: Trial) -> ClipResult:
     from standoff.cli.console import progress
-    from standoff.evaluation.paper import evaluate_clip, load_clip
+    from standoff.clips import load_clip
+    from standoff.evaluation.paper import evaluate_clip
 
     clip = load_clip(folder)
     with progress(f"watching {clip.name}", clip.frame_count) as on_frame:

@@ -22,7 +22,7 @@ def marker(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an existing file.")] = False,
 ) -> None:
     """Print a target that standoff finds by itself, and that says where the ground is."""
-    from standoff.stages.ground.marker_family import MarkerFamily
+    from standoff.stages.ground import MarkerFamily
     from standoff.targets import Paper, Target, write_target
 
     target = Target(size_m, marker_id, cast(MarkerFamily, family))

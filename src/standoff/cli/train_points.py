@@ -39,7 +39,7 @@ def train_points(
     from standoff.cli.console import print_table, progress
     from standoff.core.errors import ConfigError
     from standoff.labels import read_data
-    from standoff.stages.detect.point_crops import POINT_CLASSES
+    from standoff.stages.detect import POINT_CLASSES
     from standoff.training.ground_point import PointTraining, measure_points, read_patches, train_points, write_points
 
     unknown = sorted(set(only or ()) - set(POINT_CLASSES))

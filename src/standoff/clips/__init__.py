@@ -1,10 +1,37 @@
-"""What lies in the folder of a run, for those who write it and those who read it again.
+"""What lies in the folders of runs and of clips with exact truth, for those who write it and those who read it again.
 
->>> from standoff.clips import read_detections
+>>> from standoff.clips import load_clip, read_detections
 >>> recorded = read_detections("out")  # doctest: +SKIP
 >>> recorded.detections_at(recorded.row_of(12))  # doctest: +SKIP
+>>> load_clip("clips/mobile").distance_m  # doctest: +SKIP
 """
 
+from standoff.clips.clip import Clip, TrueBoard, TrueReference, load_clip, read_scene
+from standoff.clips.clip_folder import (
+    ANNOTATIONS_FILE,
+    CAMERA_FILE,
+    CLIP_FILES,
+    CLIP_FORMAT,
+    CLIP_FRAMES_FILE,
+    CLIP_FRAMES_SCHEMA,
+    DEVICES_FILE,
+    DEVICES_SCHEMA,
+    NOISY_DETECTIONS_FILE,
+    NOISY_DETECTIONS_SCHEMA,
+    PAIRS_FILE,
+    PAIRS_SCHEMA,
+    REFERENCE_FILE,
+    RENDER_AGAIN,
+    SCENE_FILE,
+    TELEMETRY_FILE,
+    TRUTH_FILE,
+    TRUTH_FILES,
+    TRUTH_NUMBERS,
+    TRUTH_SCHEMA,
+    VIDEO_FILE,
+    read_clip_table,
+)
+from standoff.clips.columns import Column, Columns, chosen_rows, columns_of, read_columns, schema_of
 from standoff.clips.detections import (
     COLUMNS,
     DETECTIONS_FILE,
@@ -16,11 +43,44 @@ from standoff.clips.detections import (
 )
 
 __all__ = [
+    "ANNOTATIONS_FILE",
+    "CAMERA_FILE",
+    "CLIP_FILES",
+    "CLIP_FORMAT",
+    "CLIP_FRAMES_FILE",
+    "CLIP_FRAMES_SCHEMA",
     "COLUMNS",
     "DETECTIONS_FILE",
+    "DEVICES_FILE",
+    "DEVICES_SCHEMA",
     "FOOT_COLUMNS",
+    "NOISY_DETECTIONS_FILE",
+    "NOISY_DETECTIONS_SCHEMA",
+    "PAIRS_FILE",
+    "PAIRS_SCHEMA",
+    "REFERENCE_FILE",
+    "RENDER_AGAIN",
+    "SCENE_FILE",
+    "TELEMETRY_FILE",
+    "TRUTH_FILE",
+    "TRUTH_FILES",
+    "TRUTH_NUMBERS",
+    "TRUTH_SCHEMA",
+    "VIDEO_FILE",
+    "Clip",
+    "Column",
+    "Columns",
     "RecordedDetections",
+    "TrueBoard",
+    "TrueReference",
+    "chosen_rows",
+    "columns_of",
     "is_recording",
+    "load_clip",
     "metadata_of",
+    "read_clip_table",
+    "read_columns",
     "read_detections",
+    "read_scene",
+    "schema_of",
 ]

@@ -1,8 +1,35 @@
-"""Columns of tables that may be damaged."""
+"""Columns of tables: what they are called, hold and mean, and how they are read from files that may be damaged."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy.typing as npt
 import pyarrow as pa
+import pyarrow.parquet
+
+from standoff.core.errors import DataError
+from standoff.core.homography import BoolArray
+from standoff.core.types import IntArray
+
+Column = tuple[str, pa.DataType, str, str]
+"""Name, type, unit, meaning."""
+
+Columns = Mapping[str, npt.NDArray[Any]]
+"""By name, all of one length."""
+
+
+def schema_of(columns: Sequence[Column], about: Mapping[str, str] | None = None) -> pa.Schema:
+    """Return the schema of a file in which each column says its unit and what it means.
+
+    Args:
+        columns: In their order.
+        about: Texts about the whole file.
+    """
+    fields = [pa.field(name, kind, metadata={"unit": unit, "description": text}) for name, kind, unit, text in columns]
+    return pa.schema(fields, metadata=about)
 
 
 def column_names(table: pa.Table) -> frozenset[str]:
@@ -11,3 +38,52 @@ def column_names(table: pa.Table) -> frozenset[str]:
         return frozenset(table.column_names)
     except UnicodeDecodeError:
         return frozenset()
+
+
+def chosen_rows(columns: Columns, chosen: BoolArray | IntArray) -> Columns:
+    """Return the same columns with the chosen rows only."""
+    return {name: column[chosen] for name, column in columns.items()}
+
+
+def read_columns(path: Path, names: Sequence[str], *, folder: str, fix: str) -> Columns:
+    """Read columns of a Parquet table; numbers that are null are NaN, lists become arrays of objects.
+
+    Args:
+        path: The table.
+        names: Of the columns.
+        folder: What it should be in, for messages.
+        fix: What to do where it is not, for messages.
+
+    Raises:
+        DataError: The table is missing, unreadable, or lacks a column.
+    """
+    if not path.is_file():
+        raise DataError(expected=f"{path.name} in {folder}", found=f"no {path}", fix=fix)
+    try:
+        table = pyarrow.parquet.read_table(path)
+    except (OSError, pa.ArrowException) as error:
+        raise DataError(expected=f"a whole Parquet table in {path}", found=str(error), fix=fix) from error
+    return columns_of(table, names, path, fix=fix)
+
+
+def columns_of(table: pa.Table, names: Sequence[str], path: Path | str, *, fix: str) -> Columns:
+    """Return columns of a table as arrays.
+
+    Args:
+        table: As it was read.
+        names: Of the columns.
+        path: Its file, for messages.
+        fix: What to do where one is missing, for messages.
+
+    Raises:
+        DataError: One is missing.
+    """
+    present = column_names(table)
+    missing = [name for name in names if name not in present]
+    if missing:
+        raise DataError(expected=f"the columns {','.join(names)}", found=f"{path} without {','.join(missing)}", fix=fix)
+    columns = {name: table.column(name) for name in names}
+    return {
+        name: (column.cast(pa.string()) if pa.types.is_dictionary(column.type) else column).to_numpy()
+        for name, column in columns.items()
+    }

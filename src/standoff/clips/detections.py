@@ -18,7 +18,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet
 
-from standoff.clips.columns import column_names
+from standoff.clips.columns import Column, column_names
 from standoff.core.boxes import unknown_points
 from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.errors import DataError
@@ -28,9 +28,6 @@ from standoff.core.types import Detections, IntArray
 DETECTIONS_FILE: Final = "detections.parquet"
 FORMAT: Final = 1
 METADATA_KEY: Final = "standoff_detections"
-
-Column = tuple[str, pa.DataType, str, str]
-"""Name, type, unit, meaning."""
 
 _FRAME: Final[tuple[Column, ...]] = (
     ("frame", pa.int64(), "", "index in the source, from 0, skipped frames counted"),

@@ -1,4 +1,4 @@
-"""Areas of axis-parallel boxes, what pairs of them share, and points that belong to them."""
+"""Areas of axis-parallel boxes, what pairs of them share, wider ones, and points that belong to them."""
 
 from __future__ import annotations
 
@@ -57,3 +57,23 @@ def overlaps(first_px: FloatArray, second_px: FloatArray) -> FloatArray:
     union = areas_px2(first_px)[:, None] + areas_px2(second_px) - shared
     ratio: FloatArray = shared / np.where(union > 0.0, union, 1.0)
     return ratio
+
+
+def widen(xyxy_px: FloatArray, margin: float) -> FloatArray:
+    """Grow boxes on every side by a share of their width and height.
+
+    Two people a step apart between two looks share no pixel; their widened boxes do.
+
+    Args:
+        xyxy_px: (N, 4) left, top, right, bottom.
+        margin: Share of the width (left, right) and of the height (top, bottom); 0 changes nothing.
+
+    Source:
+        Yang et al., Hard to Track Objects with Irregular Motions and Similar Appearances? Make It Easier
+        by Buffering the Matching Space (2023), section 3.2.
+
+    >>> widen(np.array([[0.0, 0.0, 10.0, 20.0]]), 0.1)
+    array([[-1., -2., 11., 22.]])
+    """
+    grow = margin * (xyxy_px[:, 2:] - xyxy_px[:, :2])
+    return np.concatenate([xyxy_px[:, :2] - grow, xyxy_px[:, 2:] + grow], axis=1)

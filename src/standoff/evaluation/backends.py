@@ -20,11 +20,15 @@ from standoff.core.errors import DataError, MissingDependency, StandoffError
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import Frame, ImageArray, IntArray
 from standoff.evaluation.timing import Spread
-from standoff.stages.detect.candidates import Candidates
-from standoff.stages.detect.letterbox import Letterbox
-from standoff.stages.detect.network import Network
-from standoff.stages.detect.params import DetectParams, Provider
-from standoff.stages.detect.runtime import ONNX_ERRORS, available_providers
+from standoff.stages.detect import (
+    ONNX_ERRORS,
+    Candidates,
+    DetectParams,
+    Letterbox,
+    Network,
+    Provider,
+    available_providers,
+)
 from standoff.stages.frames import open_source
 
 TOLERANCE: Final = 1e-3

@@ -36,10 +36,10 @@ from standoff.stages.sinks import (
     Composer,
     HazardSink,
     ReportSink,
+    Scene,
     TableSink,
     VideoParams,
 )
-from standoff.stages.sinks.scene import Scene
 from standoff.stages.track import Tracker
 from standoff.stages.watched import GroundWatcher
 

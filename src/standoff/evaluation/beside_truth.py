@@ -9,15 +9,15 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from standoff.clips import CAMERA_FILE, RENDER_AGAIN, TRUTH_FILE, VIDEO_FILE, Columns, chosen_rows, read_clip_table
 from standoff.core.classes import CLASS_BY_NAME, CLASSES, Role, class_ids
 from standoff.core.errors import DataError
 from standoff.core.homography import BoolArray
 from standoff.core.types import IntArray
 from standoff.evaluation.matching import NOTHING, match_boxes
-from standoff.evaluation.paper.clip_tables import read_table
-from standoff.evaluation.positions_input import TRACK_COLUMNS, Columns, chosen_rows, read_run_table
+from standoff.evaluation.positions_input import TRACK_COLUMNS, read_run_table
+from standoff.files.fingerprint import fingerprint
 from standoff.files.json_text import read_json
-from standoff.stages.frames.fingerprint import fingerprint
 from standoff.stages.ground import load_camera
 
 WHOLE, HIDDEN, CUT_OFF = range(3)
@@ -89,7 +89,7 @@ def read_beside_truth(
         DataError: A file is missing or not what it should be, or the run is not one of this clip.
     """
     frames = read_run_table(run / "frames.parquet", (*_FRAMES, *frame_columns))
-    camera = load_camera(clip / "camera.yaml")
+    camera = load_camera(clip / CAMERA_FILE)
     size_px = camera.width_px, camera.height_px
     truth = _read_truth(clip, size_px, truth_columns)
     record = _read_record(run)
@@ -128,11 +128,10 @@ def _read_record(run: Path) -> Mapping[str, Any]:
 
 
 def _read_truth(clip: Path, size_px: tuple[int, int], more: Sequence[str]) -> Columns:
-    truth = read_table(clip / "truth.parquet", (*_TRUTH, *more))
+    truth = read_clip_table(clip, TRUTH_FILE, (*_TRUTH, *more))
     class_id = truth["class_id"]
     if not len(class_id) or not ((class_id >= 0) & (class_id < len(CLASSES))).all():
-        fix = "render the clip again with `standoff simulate`"
-        raise DataError(expected="entities of known classes", found=f"others in {clip / 'truth.parquet'}", fix=fix)
+        raise DataError(expected="entities of known classes", found=f"others in {clip / TRUTH_FILE}", fix=RENDER_AGAIN)
     truth = {**truth, "sight": _sights(truth, np.array(size_px))}
     return chosen_rows(truth, np.argsort(truth["frame"], kind="stable"))
 
@@ -154,7 +153,7 @@ def _check_same_film(frames: Columns, truth: Columns, record: Mapping[str, Any],
         raise DataError(
             expected=f"frames of {clip}", found=f"frames in {run} that it does not have at those times", fix=fix
         )
-    video, recorded = clip / "video.mp4", (record.get("source") or {}).get("fingerprint")
+    video, recorded = clip / VIDEO_FILE, (record.get("source") or {}).get("fingerprint")
     if recorded is not None and video.is_file() and recorded != fingerprint([video]):
         raise DataError(expected=f"a run of {video}", found=f"{run}, which is of a film with other content", fix=fix)
 

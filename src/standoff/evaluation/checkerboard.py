@@ -23,9 +23,15 @@ from standoff.core.camera import Camera, CameraPrior
 from standoff.core.errors import DataError
 from standoff.core.homography import FloatArray
 from standoff.core.pose import CHANGES
-from standoff.stages.ground import BoardView, PointObservation, belief_from_points, map_from_view, read_boards
-from standoff.stages.ground.boards import check_square
-from standoff.stages.ground.solid_fit import Belief
+from standoff.stages.ground import (
+    Belief,
+    BoardView,
+    PointObservation,
+    belief_from_points,
+    check_square,
+    map_from_view,
+    read_boards,
+)
 
 FIRST_CORNER = "of the board's four outer corners the one nearest to the picture's top left"
 

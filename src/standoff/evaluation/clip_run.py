@@ -12,12 +12,12 @@ from typing import Any, Literal
 
 import numpy as np
 
+from standoff.clips import Clip
 from standoff.config import Settings
 from standoff.core.errors import DataError
 from standoff.core.types import FrameResult, Severity
 from standoff.evaluation.matching import NOTHING
 from standoff.evaluation.paper.answers import both_radii_m
-from standoff.evaluation.paper.clip import Clip
 from standoff.evaluation.paper.localisation import ClassScore, score_localisation
 from standoff.evaluation.paper.map_only import MapScore, score_map
 from standoff.evaluation.paper.pairs import PairGroup, group_pairs, pair_series

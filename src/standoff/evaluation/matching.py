@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from standoff.core.assignment import assign
 from standoff.core.boxes import overlaps
 from standoff.core.homography import FloatArray
 from standoff.core.roles import ROLE_OF_CLASS
 from standoff.core.types import IntArray
-from standoff.stages.track.association import assign
 
 MIN_OVERLAP = 0.3
 """Smallest IoU of a box with the truth's for the two to be the same thing."""

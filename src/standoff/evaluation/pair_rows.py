@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from standoff.clips import Columns
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import IntArray
 from standoff.evaluation.matching import NOTHING
-from standoff.evaluation.positions_input import Columns
+
+TRUE_PAIR_COLUMNS = ("frame", "entity_a", "entity_b", "centre_m")
+"""Of a clip's table of pairs, what distances are compared with."""
 
 
 class PairRows:

@@ -25,6 +25,8 @@ from pathlib import Path
 
 import numpy as np
 
+from standoff.clips import Columns, chosen_rows
+from standoff.core.assignment import assign
 from standoff.core.boxes import overlaps
 from standoff.core.errors import DataError
 from standoff.core.homography import FloatArray
@@ -34,12 +36,9 @@ from standoff.evaluation.pair_rows import distances_of
 from standoff.evaluation.positions_input import (
     PAIR_COLUMNS,
     TRACK_COLUMNS,
-    Columns,
-    chosen_rows,
     read_run_table,
     read_truth,
 )
-from standoff.stages.track.association import assign
 
 NOTE = "Precision is a lower bound where not everybody is labelled. Missed truth and unmeasured pairs are counted."
 _MAX_GROUND_M = 2.0

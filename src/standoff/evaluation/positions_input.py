@@ -4,29 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet
 
-from standoff.clips.columns import column_names
+from standoff.clips import Columns, columns_of, read_columns
 from standoff.core.errors import DataError
 from standoff.core.homography import BoolArray, FloatArray
-from standoff.core.types import IntArray
-
-Columns = Mapping[str, npt.NDArray[Any]]
 
 TRUTH_COLUMNS = ("frame", "id", "x", "y", "w", "h", "conf", "X", "Y")
 TRACK_COLUMNS = ("frame", "track_id", "class", "x1_px", "y1_px", "x2_px", "y2_px", "observed", "x_m", "y_m")
 PAIR_COLUMNS = ("frame", "track_a", "track_b", "distance_m", "sigma_m", "measured")
-
-
-def chosen_rows(columns: Columns, chosen: BoolArray | IntArray) -> Columns:
-    """Return the same columns with the chosen rows only."""
-    return {name: column[chosen] for name, column in columns.items()}
 
 
 def read_truth(path: Path | str) -> Columns:
@@ -48,7 +38,7 @@ def read_truth(path: Path | str) -> Columns:
             found=f"{path}, which cannot be read as one ({error})",
             fix="check the path and the file",
         ) from error
-    truth = _columns(table, TRUTH_COLUMNS, path)
+    truth = columns_of(table, TRUTH_COLUMNS, path, fix="check that it is the right file")
     for expected, right in _checks(truth).items():
         if not right.all():
             line = int(np.flatnonzero(~right)[0]) + 2
@@ -63,29 +53,7 @@ def read_run_table(path: Path, names: tuple[str, ...]) -> Columns:
         DataError: The table is missing, unreadable, or lacks a column.
     """
     fix = f"repeat `standoff run` to its end with {path.stem} among its outputs"
-    if not path.is_file():
-        raise DataError(expected=f"{path.name} in the run folder", found=f"no {path}", fix=fix)
-    try:
-        table = pyarrow.parquet.read_table(path)
-    except (OSError, pa.ArrowException) as error:
-        raise DataError(expected=f"a whole Parquet table in {path}", found=str(error), fix=fix) from error
-    return _columns(table, names, path)
-
-
-def _columns(table: pa.Table, names: tuple[str, ...], path: Path | str) -> Columns:
-    present = column_names(table)
-    missing = [name for name in names if name not in present]
-    if missing:
-        raise DataError(
-            expected=f"the columns {','.join(names)}",
-            found=f"{path} without {','.join(missing)}",
-            fix="check that it is the right file",
-        )
-    columns = {name: table.column(name) for name in names}
-    return {
-        name: (column.cast(pa.string()) if pa.types.is_dictionary(column.type) else column).to_numpy()
-        for name, column in columns.items()
-    }
+    return read_columns(path, names, folder="the run folder", fix=fix)
 
 
 def _checks(truth: Columns) -> Mapping[str, BoolArray]:

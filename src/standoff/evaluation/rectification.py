@@ -13,11 +13,18 @@ import numpy as np
 from standoff.core.homography import FloatArray
 from standoff.core.types import NoGroundMap
 from standoff.evaluation.drawn_quadrilaterals import DIFFICULTIES, Difficulty, Scene, draw_scene
-from standoff.stages.ground.edges import Edges, canny, sobel_gradients
-from standoff.stages.ground.lines import line_through, ransac_contours, sample_pairs
-from standoff.stages.ground.outline import OutlineFinder
-from standoff.stages.ground.params import ReferenceMethod, ReferenceParams
-from standoff.stages.ground.quadrilateral import Quadrilateral
+from standoff.stages.ground import (
+    Edges,
+    OutlineFinder,
+    Quadrilateral,
+    ReferenceMethod,
+    ReferenceParams,
+    canny,
+    line_through,
+    ransac_contours,
+    sample_pairs,
+    sobel_gradients,
+)
 
 METHODS: tuple[ReferenceMethod, ...] = ("paper", "paper+tls", "oriented")
 FAILURE_PX = 5.0

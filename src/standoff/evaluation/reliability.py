@@ -9,10 +9,10 @@ from importlib.resources import files
 import jinja2
 from markupsafe import Markup
 
+from standoff.drawing.page_charts import MUTED, inline_svg, themed_figure
+from standoff.drawing.palette import HEX
 from standoff.evaluation.paper.metrics import DistanceScore
 from standoff.evaluation.stated_errors import ONE_SIGMA, PROBABILITIES, Coverage
-from standoff.stages.sinks.charts import MUTED, inline_svg, themed_figure
-from standoff.stages.sinks.palette import HEX
 
 Measured = tuple[str, DistanceScore, Coverage]
 """A kind of pair, its errors, and how true the stated ones are."""

@@ -14,10 +14,10 @@ from PIL import Image, UnidentifiedImageError
 from standoff.core.errors import DataError
 from standoff.core.types import ImageArray
 from standoff.files.lfs import POINTER, is_pointer, refuse_pointer
+from standoff.files.orientation import UPRIGHT, Orientation
+from standoff.files.picture_header import PictureHeader, UnreadablePicture, read_header
 from standoff.labels.source import BadPicture
 from standoff.labels.types import UNREADABLE, LabelledPicture, Problem
-from standoff.stages.frames.orientation import UPRIGHT, Orientation
-from standoff.stages.frames.picture_header import PictureHeader, UnreadablePicture, read_header
 
 SUFFIXES: Final = frozenset({".bmp", ".jpeg", ".jpg", ".png", ".tif", ".tiff", ".webp"})
 TURNED: Final = "turned by EXIF data"

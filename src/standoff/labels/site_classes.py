@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from standoff.core.class_map import map_classes
 from standoff.core.classes import CLASS_BY_NAME, CLASSES
 from standoff.core.errors import DataError, ModelError
 from standoff.labels.types import LabelledData, LabelledPicture
@@ -50,9 +51,6 @@ def site_names(labels: tuple[str, ...], *, fix: str) -> dict[str, str]:
     Raises:
         DataError: None does.
     """
-    # ONNX Runtime, which comes with it, takes long to load, and most who read labels do not need it
-    from standoff.stages.detect.class_map import map_classes
-
     try:
         return map_classes(labels, {}, "the labelled pictures")
     except ModelError as error:

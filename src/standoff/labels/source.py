@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Final, TypeVar
 
 from standoff.core.homography import BoolArray, FloatArray
+from standoff.files.orientation import UPRIGHT, Orientation
 from standoff.labels.ground_points import NO_POINTS, one_point_a_box
 from standoff.labels.types import Problem, Split
-from standoff.stages.frames.orientation import UPRIGHT, Orientation
 
 ELSEWHERE: Final = "found elsewhere than its labels say"
 """Kind of problem of a file whose path is of another computer."""

@@ -9,8 +9,8 @@ from typing import Literal, get_args
 
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import IntArray
+from standoff.files.orientation import UPRIGHT, Orientation
 from standoff.labels.ground_points import NO_POINTS, one_point_a_box
-from standoff.stages.frames.orientation import UPRIGHT, Orientation
 
 Split = Literal["train", "val", "test"]
 SPLITS: tuple[Split, ...] = get_args(Split)

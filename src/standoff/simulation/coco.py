@@ -35,7 +35,7 @@ class Annotations:
 
         Args:
             image: COCO's own fields less `id`, `width` and `height`.
-            entities: Rows of `truth.TRUTH_SCHEMA`.
+            entities: Rows of `standoff.clips.TRUTH_SCHEMA`.
             size_px: (width, height).
             ids: (H, W) id picture for masks, or None to leave them out.
         """

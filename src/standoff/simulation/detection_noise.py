@@ -10,19 +10,11 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
-import pyarrow as pa
 from scipy.special import expit, ndtr
 
 from standoff.core.classes import CLASSES
 from standoff.core.homography import FloatArray
 from standoff.simulation.truth import Row
-
-DETECTIONS_SCHEMA = pa.schema(
-    [("frame", pa.int32()), ("time_s", pa.float64())]
-    + [(name, pa.float64()) for name in ("x1_px", "y1_px", "x2_px", "y2_px", "score")]
-    + [("class", pa.string()), ("class_id", pa.int32())]
-)
-"""One row per detection, frame by frame, the surest first."""
 
 USUAL_SIZE_PX = 32.0
 """Square root of a box's area at which `found` and `score` begin to count."""
@@ -146,7 +138,7 @@ class NoisyDetector:
         self._latent: dict[int, tuple[float, FloatArray]] = {}
 
     def detect(self, frame: int, time_s: float, entities: Sequence[Row]) -> list[Row]:
-        """Return rows of `DETECTIONS_SCHEMA`.
+        """Return rows of `NOISY_DETECTIONS_SCHEMA`.
 
         Args:
             frame: Its index.

@@ -40,8 +40,8 @@ class Picture:
         name: Of the file, without folder.
         jpeg: Its content.
         size_px: (width, height).
-        entities: What is marked in it: class and box as in `truth.TRUTH_SCHEMA`; COCO's layout also needs what is
-            visible.
+        entities: What is marked in it: class and box as in `standoff.clips.TRUTH_SCHEMA`; COCO's layout also needs
+            what is visible.
         ignored_px: Left, top, right, bottom of places of which nothing is known.
         about: Further fields of the picture in COCO's layout.
         view: Where it was taken from; None: nobody knows.

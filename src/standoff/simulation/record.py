@@ -15,6 +15,26 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from standoff import __version__
+from standoff.clips import (
+    ANNOTATIONS_FILE,
+    CAMERA_FILE,
+    CLIP_FILES,
+    CLIP_FORMAT,
+    CLIP_FRAMES_FILE,
+    CLIP_FRAMES_SCHEMA,
+    DEVICES_FILE,
+    DEVICES_SCHEMA,
+    NOISY_DETECTIONS_FILE,
+    NOISY_DETECTIONS_SCHEMA,
+    PAIRS_FILE,
+    PAIRS_SCHEMA,
+    REFERENCE_FILE,
+    SCENE_FILE,
+    TELEMETRY_FILE,
+    TRUTH_FILE,
+    TRUTH_SCHEMA,
+    VIDEO_FILE,
+)
 from standoff.core.classes import CLASSES
 from standoff.core.homography import FloatArray
 from standoff.core.pose import View
@@ -22,7 +42,7 @@ from standoff.files.whole import whole_folder
 from standoff.files.yaml_text import write_yaml
 from standoff.simulation.coco import Annotations
 from standoff.simulation.crew import work_through
-from standoff.simulation.detection_noise import DETECTIONS_SCHEMA, NoisyDetector
+from standoff.simulation.detection_noise import NoisyDetector
 from standoff.simulation.presets import Plan
 from standoff.simulation.scene import Actor, Reference
 from standoff.simulation.sensor import VideoWriter
@@ -30,17 +50,11 @@ from standoff.simulation.site import Site, build_site
 from standoff.simulation.studio import Shot, Studio
 from standoff.simulation.survey import Surveyor
 from standoff.simulation.telemetry import Origin, ShownSettings, write_telemetry
-from standoff.simulation.truth import FRAMES_SCHEMA, PAIRS_SCHEMA, TRUTH_SCHEMA, FrameTruth, Row
-from standoff.simulation.wearables import DEVICES_SCHEMA, report_positions
+from standoff.simulation.truth import FrameTruth, Row
+from standoff.simulation.wearables import report_positions
 
 Made = TypeVar("Made")
 
-FORMAT = 1
-"""Of the clip folder; `scene.json` carries it."""
-TABLES = frozenset({"truth.parquet", "pairs.parquet", "frames.parquet", "scene.json", "camera.yaml", "reference.yaml"})
-"""What every clip holds."""
-CLIP_FILES = TABLES | {"video.mp4", "annotations.json", "telemetry.srt", "detections.parquet", "devices.parquet"}
-"""What a clip may hold; which of them it does depends on how it was made."""
 _AHEAD_ROWS = 20_000
 """Rows that are kept until they are written: hours of site time do not fit into the memory."""
 _EARTH, _DEVICES, _DETECTIONS = 1299709, 32452843, 49979687
@@ -82,16 +96,16 @@ def record_clip(
         size_px = (plan.preset.width_px, plan.preset.height_px)
         shots = _work(open_shooter, plan, site, times_s, processes)
         rate_bps = None if plan.preset.bit_rate_mbps is None else int(plan.preset.bit_rate_mbps * 1e6)
-        film = VideoWriter(folder / "video.mp4", size_px, bit_rate_bps=rate_bps)
+        film = VideoWriter(folder / VIDEO_FILE, size_px, bit_rate_bps=rate_bps)
         with closing(shots), film as video, Tables(folder) as tables:
             for shot in shots:
                 video.write(shot.image, shot.frame["time_s"])
                 tables.add(shot)
-                picture = {"file_name": "video.mp4", "frame": shot.index, "time_s": shot.frame["time_s"]}
+                picture = {"file_name": VIDEO_FILE, "frame": shot.index, "time_s": shot.frame["time_s"]}
                 annotations.add(picture, shot.entities, size_px, shot.ids if plan.masks else None)
                 if on_frame is not None:
                     on_frame()
-        _save_json(annotations.to_dict(f"standoff {plan.name}, seed {plan.seed}"), folder / "annotations.json")
+        _save_json(annotations.to_dict(f"standoff {plan.name}, seed {plan.seed}"), folder / ANNOTATIONS_FILE)
         _save_surroundings(plan, site, times_s, folder)
 
 
@@ -184,13 +198,12 @@ class Tables:
     """
 
     def __init__(self, folder: Path, *, detected: bool = False) -> None:
-        schemas = {"truth": TRUTH_SCHEMA, "pairs": PAIRS_SCHEMA, "frames": FRAMES_SCHEMA}
-        schemas |= {"detections": DETECTIONS_SCHEMA} if detected else {}
+        schemas = {TRUTH_FILE: TRUTH_SCHEMA, PAIRS_FILE: PAIRS_SCHEMA, CLIP_FRAMES_FILE: CLIP_FRAMES_SCHEMA}
+        schemas |= {NOISY_DETECTIONS_FILE: NOISY_DETECTIONS_SCHEMA} if detected else {}
         self._rows: dict[str, list[Row]] = {name: [] for name in schemas}
         self._stack = ExitStack()
         self._writers = {
-            name: self._stack.enter_context(pq.ParquetWriter(folder / f"{name}.parquet", schema))
-            for name, schema in schemas.items()
+            name: self._stack.enter_context(pq.ParquetWriter(folder / name, schema)) for name, schema in schemas.items()
         }
 
     def __enter__(self) -> Tables:
@@ -203,7 +216,12 @@ class Tables:
 
     def add(self, truth: Shot | FrameTruth, detections: Sequence[Row] = ()) -> None:
         """Add a frame."""
-        added = {"truth": truth.entities, "pairs": truth.pairs, "frames": [truth.frame], "detections": detections}
+        added = {
+            TRUTH_FILE: truth.entities,
+            PAIRS_FILE: truth.pairs,
+            CLIP_FRAMES_FILE: [truth.frame],
+            NOISY_DETECTIONS_FILE: detections,
+        }
         for name, rows in self._rows.items():
             rows += added[name]
         self._flush(least=_AHEAD_ROWS)
@@ -220,9 +238,9 @@ def _save_surroundings(plan: Plan, site: Site, times_s: FloatArray, folder: Path
     # numba, which comes with it, takes long to load, and every process that renders would wait for it
     from standoff.stages.ground import save_camera
 
-    _save_json(describe_scene(plan, site), folder / "scene.json")
-    save_camera(site.camera, folder / "camera.yaml")
-    _save_reference(site.scene.reference, site.scene.flight.view(times_s[0]), folder / "reference.yaml")
+    _save_json(describe_scene(plan, site), folder / SCENE_FILE)
+    save_camera(site.camera, folder / CAMERA_FILE)
+    _save_reference(site.scene.reference, site.scene.flight.view(times_s[0]), folder / REFERENCE_FILE)
     origin = Origin.draw(np.random.default_rng([plan.seed, _EARTH]))
     errors = np.random.default_rng([plan.seed, _EARTH])
     if plan.camera == 1:
@@ -230,17 +248,17 @@ def _save_surroundings(plan: Plan, site: Site, times_s: FloatArray, folder: Path
     else:
         errors = np.random.default_rng([plan.seed, _EARTH, plan.camera])
     shown = ShownSettings(iso=round(site.sensor.iso), shutter_hz=1 / site.shutter_s)
-    write_telemetry(folder / "telemetry.srt", site.scene.flight, times_s, errors, shown, origin=origin)
+    write_telemetry(folder / TELEMETRY_FILE, site.scene.flight, times_s, errors, shown, origin=origin)
     if plan.devices:
         reports = report_positions(site.scene, float(times_s[-1]), origin, np.random.default_rng([plan.seed, _DEVICES]))
-        pq.write_table(pa.Table.from_pylist(reports, schema=DEVICES_SCHEMA), folder / "devices.parquet")
+        pq.write_table(pa.Table.from_pylist(reports, schema=DEVICES_SCHEMA), folder / DEVICES_FILE)
 
 
 def describe_scene(plan: Plan, site: Site) -> dict[str, Any]:
     """Return what `scene.json` holds: everything that does not change from frame to frame."""
     scene = site.scene
     return {
-        "format": FORMAT,
+        "format": CLIP_FORMAT,
         "standoff": __version__,
         "seed": plan.seed,
         "preset": plan.name,
@@ -281,7 +299,7 @@ def _describe_reference(reference: Reference) -> dict[str, Any]:
 
 def _save_reference(reference: Reference | None, view: View, path: Path) -> None:
     """Write settings with the reference object's shape; a hint tells its corners apart where its shape does not."""
-    ground: dict[str, Any] = {"camera": "camera.yaml"}
+    ground: dict[str, Any] = {"camera": CAMERA_FILE}
     if reference is not None:
         first_px = view.project(reference.top_m[:1])[0]
         size_px = (view.camera.width_px, view.camera.height_px)

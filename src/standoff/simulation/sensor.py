@@ -16,10 +16,10 @@ from scipy.ndimage import gaussian_filter
 
 from standoff.core.homography import FloatArray
 from standoff.core.types import ImageArray
+from standoff.drawing.encoder import VideoFile
 from standoff.files.place import partial_path
 from standoff.simulation.band_noise import BandNoise
 from standoff.simulation.presets import Condition
-from standoff.stages.sinks.encoder import VideoFile
 
 _TILE_PX = 1024
 _TILE_UNIT = 28  # noise of one standard deviation in the tile

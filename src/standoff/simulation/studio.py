@@ -22,9 +22,9 @@ class Shot:
         index: Of the frame.
         image: (H, W, 3) uint8 BGR, as the camera's sensor gives it.
         ids: (H, W) entity under each pixel, 0 for none.
-        entities: Rows of `truth.TRUTH_SCHEMA`.
-        pairs: Rows of `truth.PAIRS_SCHEMA`.
-        frame: Row of `truth.FRAMES_SCHEMA`.
+        entities: Rows of `standoff.clips.TRUTH_SCHEMA`.
+        pairs: Rows of `standoff.clips.PAIRS_SCHEMA`.
+        frame: Row of `standoff.clips.CLIP_FRAMES_SCHEMA`.
     """
 
     index: int

@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import pyarrow as pa
 import shapely
 from scipy.spatial import ConvexHull, QhullError
 
+from standoff.clips import TRUTH_NUMBERS
 from standoff.core.classes import CLASSES, Role
 from standoff.core.homography import FloatArray
 from standoff.core.pose import View
@@ -27,37 +27,6 @@ from standoff.simulation.scene import Batch, Reference
 
 Row = dict[str, Any]
 IdArray = npt.NDArray[np.uint16]
-
-_SCALARS = [
-    *("x_m", "y_m", "z_m", "heading_deg", "vx_mps", "vy_mps", "tip_x_m", "tip_y_m", "tip_z_m"),
-    *("x1_px", "y1_px", "x2_px", "y2_px", "full_x1_px", "full_y1_px", "full_x2_px", "full_y2_px"),
-    *("visible_share", "foot_x_px", "foot_y_px"),
-]
-_FLOATS = pa.list_(pa.float64())
-
-TRUTH_SCHEMA = pa.schema(
-    [("frame", pa.int32()), ("time_s", pa.float64()), ("entity_id", pa.int32()), ("class_id", pa.int32())]
-    + [("class_name", pa.string()), ("visible_px", pa.int32())]
-    + [(name, pa.float64()) for name in _SCALARS]
-    + [("footprint_x_m", _FLOATS), ("footprint_y_m", _FLOATS)]
-)
-"""One row per frame and entity; `docs/simulator.md` says what each column means."""
-
-PAIRS_SCHEMA = pa.schema(
-    [("frame", pa.int32()), ("time_s", pa.float64()), ("entity_a", pa.int32()), ("entity_b", pa.int32())]
-    + [(name, pa.float64()) for name in ("centre_m", "footprint_m", "tip_m")]
-)
-"""One row per frame and pair of entities, the reference object left out."""
-
-FRAMES_SCHEMA = pa.schema(
-    [("frame", pa.int32()), ("time_s", pa.float64())]
-    + [(name, pa.float64()) for name in ("camera_x_m", "camera_y_m", "camera_z_m")]
-    + [("site_to_camera", _FLOATS)]
-    + [(f"reference_{end}_{axis}_px", _FLOATS) for end in ("top", "base") for axis in "xy"]
-    + [("reference_covered", pa.bool_()), ("reference_visible_share", pa.float64())]
-    + [("board_x_px", _FLOATS), ("board_y_px", _FLOATS)]
-)
-"""One row per frame: the camera and the reference object."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,7 +55,7 @@ class FrameTruth:
         index: Of the frame.
         entities: Rows of `TRUTH_SCHEMA`.
         pairs: Rows of `PAIRS_SCHEMA`.
-        frame: Row of `FRAMES_SCHEMA`.
+        frame: Row of `CLIP_FRAMES_SCHEMA`.
     """
 
     index: int
@@ -184,7 +153,7 @@ def entity_row(frame: int, moment: Moment, body: Body, sight: Sight, foot_px: Fl
         "class_id": body.class_id,
         "class_name": CLASSES[body.class_id].name,
         "visible_px": sight.visible_px,
-        **dict(zip(_SCALARS, map(float, numbers), strict=True)),
+        **dict(zip(TRUTH_NUMBERS, map(float, numbers), strict=True)),
         "footprint_x_m": body.footprint_m[:, 0].tolist(),
         "footprint_y_m": body.footprint_m[:, 1].tolist(),
     }
@@ -223,7 +192,7 @@ def _tip_distance_m(first: Body, second: Body) -> float:
 def frame_row(
     frame: int, moment: Moment, reference: Reference | None, board_m: FloatArray | None, entities: Sequence[Row]
 ) -> Row:
-    """Return the row of `FRAMES_SCHEMA` for one frame.
+    """Return the row of `CLIP_FRAMES_SCHEMA` for one frame.
 
     Args:
         frame: Its index.

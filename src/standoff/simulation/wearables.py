@@ -17,7 +17,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import pyarrow as pa
 import shapely
 
 from standoff.core.homography import FloatArray
@@ -26,12 +25,6 @@ from standoff.simulation.motion import sample
 from standoff.simulation.scene import NOTHING, Actor, Batch, Ground, Scene
 from standoff.simulation.telemetry import DRIFT_BAND_HZ, Origin
 from standoff.simulation.truth import Row
-
-DEVICES_SCHEMA = pa.schema(
-    [("time_s", pa.float64()), ("device_id", pa.string()), ("entity_id", pa.int32())]
-    + [(name, pa.float64()) for name in ("latitude_deg", "longitude_deg", "x_m", "y_m", "hdop", "accuracy_m")]
-)
-"""One row per report, in the order of time."""
 
 DRIFT_M = (0.5, 3.0)
 NOISE_M = (0.15, 0.4)

@@ -10,7 +10,7 @@ from typing import Literal, get_args
 
 from standoff.core.errors import ConfigError
 from standoff.core.homography import BoolArray
-from standoff.stages.ground.marker_family import MarkerFamily, marker_pattern
+from standoff.stages.ground import MarkerFamily, marker_pattern
 
 Paper = Literal["A4", "A3", "A2", "A1", "A0", "letter", "tabloid", "single"]
 PAPERS: tuple[Paper, ...] = get_args(Paper)

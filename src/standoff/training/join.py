@@ -17,8 +17,9 @@ import numpy.typing as npt
 import onnx
 
 from standoff.core.errors import ConfigError, ModelError
+from standoff.files.fingerprint import file_sha256
 from standoff.files.whole import whole_file
-from standoff.stages.detect.model_card import INPUT_NAME, OUTPUT_NAME, POINTS_NAME, ModelCard, file_sha256
+from standoff.stages.detect import BOXES_OUTPUT, PICTURE_INPUT, POINTS_OUTPUT, ModelCard
 from standoff.training.quantization.onnx_file import read_own_model
 
 _BOX_COLUMNS = 5
@@ -134,31 +135,31 @@ def _joined(models: Sequence[onnx.ModelProto], factors: Sequence[_Floats]) -> on
         prefix = f"part{index}_"
         graph = onnx.compose.add_prefix_graph(model.graph, prefix)
         for node in graph.node:
-            node.input[:] = [INPUT_NAME if name == prefix + INPUT_NAME else name for name in node.input]
+            node.input[:] = [PICTURE_INPUT if name == prefix + PICTURE_INPUT else name for name in node.input]
         nodes += graph.node
         tensors += graph.initializer
-        boxes = prefix + OUTPUT_NAME
+        boxes = prefix + BOXES_OUTPUT
         if (factor != 1).any():
             columns = np.concatenate([np.ones(_BOX_COLUMNS, np.float32), factor]).reshape(1, 1, -1)
             tensors.append(onnx.numpy_helper.from_array(columns, f"{prefix}factors"))
             nodes.append(onnx.helper.make_node("Mul", [boxes, f"{prefix}factors"], [f"{boxes}_scaled"]))
             boxes += "_scaled"
         outputs.append(boxes)
-    nodes.append(onnx.helper.make_node("Concat", outputs, [OUTPUT_NAME], axis=1))
+    nodes.append(onnx.helper.make_node("Concat", outputs, [BOXES_OUTPUT], axis=1))
     first = models[0].graph
-    rows = [_output(model, OUTPUT_NAME)[1] for model in models]
-    results = [_result(OUTPUT_NAME, sum(rows), _output(models[0], OUTPUT_NAME)[2])]
-    widths = [_output(model, POINTS_NAME)[2:] for model in models]
+    rows = [_output(model, BOXES_OUTPUT)[1] for model in models]
+    results = [_result(BOXES_OUTPUT, sum(rows), _output(models[0], BOXES_OUTPUT)[2])]
+    widths = [_output(model, POINTS_OUTPUT)[2:] for model in models]
     if any(widths):
-        points = [f"part{index}_{POINTS_NAME}" for index in range(len(models))]
+        points = [f"part{index}_{POINTS_OUTPUT}" for index in range(len(models))]
         missing = [index for index, width in enumerate(widths) if not width]
         point_columns = max(widths)[0]
         tensors += [
             onnx.numpy_helper.from_array(np.full((1, rows[index], point_columns), np.nan, np.float32), points[index])
             for index in missing
         ]
-        nodes.append(onnx.helper.make_node("Concat", points, [POINTS_NAME], axis=1))
-        results.append(_result(POINTS_NAME, sum(rows), point_columns))
+        nodes.append(onnx.helper.make_node("Concat", points, [POINTS_OUTPUT], axis=1))
+        results.append(_result(POINTS_OUTPUT, sum(rows), point_columns))
     graph = onnx.helper.make_graph(nodes, "joined", list(first.input), results, tensors)
     return onnx.helper.make_model(graph, opset_imports=_used_opsets(models[0]), ir_version=models[0].ir_version)
 

@@ -22,13 +22,12 @@ from standoff.evaluation.coverage import ClipSamples, read_samples
 from standoff.monitor import Monitor, Run
 from standoff.simulation.presets import plan_clip
 from standoff.simulation.record import record_truth
-from standoff.stages.frames.pictures import ArrayPicture
-from standoff.stages.ground import load_camera
-from standoff.stages.ground.pose_map import map_from_view
+from standoff.stages.frames import ArrayPicture
+from standoff.stages.ground import load_camera, map_from_view
 from standoff.stages.hazard import HazardMonitor
 from standoff.stages.locate import Locator
 from standoff.stages.proximity import ProximityMeter
-from standoff.stages.sinks.tables import FRAMES, PROXIMITY, ZONED_TRACKS, TableSink
+from standoff.stages.sinks import FRAMES, PROXIMITY, ZONED_TRACKS, TableSink
 from standoff.stages.track import Tracker
 from standoff.stages.watched import GroundWatcher
 

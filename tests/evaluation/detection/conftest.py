@@ -5,11 +5,11 @@ from pathlib import Path
 from unittest.mock import patch
 
 import av
+import drawn_clip
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from evaluation.paper import drawn_clip
 from stages.detect.conftest import make_model
 
 __all__ = ["make_model"]

@@ -3,9 +3,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+import drawn_clip
 import numpy as np
 import pytest
-from evaluation.paper import drawn_clip
 from labelled_sets import write_yolo
 
 from standoff.core import protocols

@@ -3,13 +3,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from evaluation.paper import drawn_board, drawn_clip
-
-
-@pytest.fixture(scope="session")
-def clip_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A drawn clip; never changed by a test."""
-    return drawn_clip.write_clip(tmp_path_factory.mktemp("clips") / "drawn")
+from evaluation.paper import drawn_board
 
 
 @pytest.fixture(scope="session")

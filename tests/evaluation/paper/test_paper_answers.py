@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from laws import examples
 
+from standoff.clips import Clip
 from standoff.config import load_settings
 from standoff.core.types import Hazard, Phase, Severity
-from standoff.evaluation.paper import Clip
 from standoff.evaluation.paper.answers import (
     ANSWERS,
     CLEAR,

@@ -1,23 +1,20 @@
 from __future__ import annotations
 
-import json
-import shutil
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import drawn_clip
 import numpy as np
-import pyarrow.parquet as pq
 import pytest
-from evaluation.paper import drawn_clip
 
+from standoff.clips import Clip, load_clip
 from standoff.config import Settings, build_stage
 from standoff.config.settings import StageName
 from standoff.core import protocols
 from standoff.core.camera import CameraPrior
 from standoff.core.errors import DataError
 from standoff.core.types import Detections, Frame, NoCameraMotion, NoGroundMap
-from standoff.evaluation.paper import BoxError, Clip, Trial, evaluate_clip, load_clip
+from standoff.evaluation.paper import BoxError, Trial, evaluate_clip
 from standoff.evaluation.paper.localisation import true_scale_m_per_px
 from standoff.evaluation.paper.trial import settings_for
 from standoff.evaluation.paper.truth_detector import REFERENCE_MARGIN_PX, TrueBoxes
@@ -27,68 +24,6 @@ from standoff.stages.frames import frame_from_array
 from standoff.stages.ground import ReferenceShape
 
 PICTURE = np.zeros((4, 4, 3), np.uint8)
-
-
-@pytest.fixture
-def copy_of(clip_folder: Path, tmp_path: Path) -> Path:
-    return Path(shutil.copytree(clip_folder, tmp_path / "copy"))
-
-
-def test_a_clip_is_read_as_it_was_written(clip_folder: Path) -> None:
-    clip = load_clip(clip_folder)
-    assert clip.frame_count == drawn_clip.FRAMES
-    assert clip.names() == ["worker", "wheel_loader", "excavator"]
-    assert clip.pairs.tolist() == [[0, 1], [0, 2]]
-    worker, loader, excavator = drawn_clip.ENTITIES
-    for frame in (0, 17):
-        expected = [drawn_clip.true_distance_m(frame, worker, other) for other in (loader, excavator)]
-        assert clip.distance_m[frame].tolist() == pytest.approx(expected)
-        np.testing.assert_allclose(clip.xy_m[frame, 1], loader.xy_m(drawn_clip.time_s(frame)))
-    assert np.flatnonzero(np.isnan(clip.box_px[:, 2, 0])).tolist() == list(drawn_clip.UNSEEN)
-
-
-def _without(name: str) -> Callable[[Path], None]:
-    return lambda folder: (folder / name).unlink()
-
-
-def _scene(**changes: object) -> Callable[[Path], None]:
-    def change(folder: Path) -> None:
-        path = folder / "scene.json"
-        path.write_text(json.dumps(json.loads(path.read_text()) | changes))
-
-    return change
-
-
-def _no_camera_column(folder: Path) -> None:
-    table = pq.read_table(folder / "frames.parquet")
-    pq.write_table(table.drop_columns(["reference_covered"]), folder / "frames.parquet")
-
-
-def _broken_table(folder: Path) -> None:
-    (folder / "truth.parquet").write_bytes(b"PAR1")
-
-
-@pytest.mark.parametrize(
-    ("spoil", "said"),
-    [
-        (_without("scene.json"), "no .*scene.json"),
-        (_without("video.mp4"), "no .*video.mp4"),
-        (_without("truth.parquet"), "no .*truth.parquet"),
-        (_without("camera.yaml"), "no .*camera.yaml"),
-        (_scene(format=2), "format 2"),
-        (_scene(reference=None), "neither"),
-        (_scene(board={"corners_m": [[0.0, 0.0, 0.0]] * 12, "square_m": 1.0}), "12 in"),
-        (_no_camera_column, "without reference_covered"),
-        (_broken_table, "whole Parquet table"),
-    ],
-)
-def test_a_folder_that_is_no_clip_is_refused_in_one_line(
-    copy_of: Path, spoil: Callable[[Path], None], said: str
-) -> None:
-    spoil(copy_of)
-    with pytest.raises(DataError, match=said) as refused:
-        load_clip(copy_of)
-    assert "\n" not in str(refused.value)
 
 
 def test_truth_of_another_length_than_the_video_is_refused(copy_of: Path) -> None:
@@ -122,13 +57,6 @@ def test_which_corner_is_which_is_told(clip_folder: Path) -> None:
     unseen = replace(clip, reference_box_px=np.full_like(clip.reference_box_px, np.nan))
     reference = settings_for(unseen, Trial()).ground.reference
     assert reference is not None and reference.first_corner_px is None
-
-
-def test_pairs_without_a_true_distance_are_left_out(copy_of: Path) -> None:
-    table = pq.read_table(copy_of / "pairs.parquet")
-    rows = np.arange(len(table))
-    pq.write_table(table.take(rows[table["entity_b"].to_numpy() != 3]), copy_of / "pairs.parquet")
-    assert load_clip(copy_of).pairs.tolist() == [[0, 1]]
 
 
 def test_true_boxes_are_the_truths_own(clip_folder: Path) -> None:
@@ -194,7 +122,7 @@ def test_a_clip_with_a_board_alone_gets_the_lab_test_alone(board_folder: Path) -
     ],
 )
 def test_a_preset_gets_the_papers_figures_that_are_its_own(copy_of: Path, preset: str, figures: set[str]) -> None:
-    _scene(preset=preset)(copy_of)
+    drawn_clip.change_scene(copy_of, preset=preset)
     result = evaluate_clip(load_clip(copy_of), Trial(method="oriented"))
     assert {figure.name for figure in result.figures()} == figures
     assert {group.class_pair for group in result.groups} == {"worker-wheel_loader", "worker-excavator"}

@@ -4,16 +4,17 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import drawn_clip
 import numpy as np
 import pytest
 import tolerances
-from evaluation.paper import drawn_clip
 
 from standoff.cli.paper_tables import print_results
+from standoff.clips import Clip, load_clip
 from standoff.core.homography import FloatArray
 from standoff.core.pose import View
 from standoff.core.types import GroundMap
-from standoff.evaluation.paper import Clip, ClipResult, Trial, evaluate_clip, load_clip, pool, write_report
+from standoff.evaluation.paper import ClipResult, Trial, evaluate_clip, pool, write_report
 from standoff.evaluation.paper.map_only import NEAR_M, MapSamples, figures_of, score_map
 from standoff.evaluation.paper.mapped_points import MappedPoints, level_feet_px
 from standoff.evaluation.paper.rectified import score_rectification

@@ -4,14 +4,15 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
+import drawn_clip
 import pytest
 import tolerances
-from evaluation.paper import drawn_clip
 from stages.sinks.fake_site import FakeSite
 
+from standoff.clips import load_clip
 from standoff.core.errors import DataError
 from standoff.core.types import Outcome
-from standoff.evaluation.paper import Trial, evaluate_clip, load_clip
+from standoff.evaluation.paper import Trial, evaluate_clip
 from standoff.evaluation.paper.truth_detector import TrueBoxes
 from standoff.evaluation.paper.watch import open_clip_video
 from standoff.stages.sinks import TableSink, detections_table

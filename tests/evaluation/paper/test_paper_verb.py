@@ -7,10 +7,11 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import drawn_clip
 import numpy as np
 import pytest
 import tolerances
-from evaluation.paper import drawn_board, drawn_clip
+from evaluation.paper import drawn_board
 from pages import without_pictures
 from typer.testing import CliRunner
 

@@ -13,7 +13,7 @@ from square_detector import draw_squares, write_detector
 from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.errors import ModelError
 from standoff.stages.detect import DetectParams, OnnxDetector
-from standoff.stages.detect.point_crops import AROUND, POINT_CLASSES
+from standoff.stages.detect.point_crops import POINT_CLASSES, POINT_CROP_AROUND
 from standoff.stages.detect.point_network import TELLS_KEY, PointNetwork
 from standoff.stages.frames import frame_from_array
 
@@ -47,7 +47,7 @@ def test_every_class_has_its_own_points_and_the_reference_none(points_file: Path
         class_id = np.array([CLASS_BY_NAME[name].id, CLASS_BY_NAME["reference"].id, CLASS_BY_NAME[name].id])
         points_px, sigma_px = network.points(image, boxes_px, class_id)
         assert np.isnan(points_px[1]).all() and np.isnan(sigma_px[1]).all()
-        side_px = AROUND * (boxes_px[:, 2:] - boxes_px[:, :2]).max(axis=1)
+        side_px = POINT_CROP_AROUND * (boxes_px[:, 2:] - boxes_px[:, :2]).max(axis=1)
         middle_px = (boxes_px[:, :2] + boxes_px[:, 2:]) / 2.0
         expected_px = middle_px + (PLACES[POINT_CLASSES.index(name)] - 0.5) * side_px[:, None]
         np.testing.assert_allclose(points_px[[0, 2]], expected_px[[0, 2]], atol=1.0)
@@ -77,7 +77,7 @@ def test_boxes_of_a_detector_without_points_get_some_in_the_pixels_of_the_pictur
     known = np.isin(found.class_id, [CLASS_BY_NAME[name].id for name in POINT_CLASSES])
     assert known.any()
     by_class = {CLASS_BY_NAME[name].id: PLACES[k] for k, name in enumerate(POINT_CLASSES)}
-    side_px = AROUND * (found.xyxy_px[:, 2:] - found.xyxy_px[:, :2]).max(axis=1)
+    side_px = POINT_CROP_AROUND * (found.xyxy_px[:, 2:] - found.xyxy_px[:, :2]).max(axis=1)
     middle_px = (found.xyxy_px[:, :2] + found.xyxy_px[:, 2:]) / 2.0
     for row in np.flatnonzero(known):
         expected_px = middle_px[row] + (by_class[int(found.class_id[row])] - 0.5) * side_px[row]

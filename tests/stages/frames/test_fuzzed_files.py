@@ -15,9 +15,9 @@ from mutations import mutated
 from PIL import Image
 
 from standoff.core.errors import SourceError
+from standoff.files.picture_header import UnreadablePicture, read_header, read_whole_header
 from standoff.stages.frames import open_source
 from standoff.stages.frames.flight_log import FlightLog, NoFlightLog, read_flight_log
-from standoff.stages.frames.picture_header import UnreadablePicture, read_header, read_whole_header
 
 _BRACKETED = """{0}
 00:00:{0:02d},000 --> 00:00:{1:02d},000

@@ -15,8 +15,8 @@ from stages.frames.coded_video import Recipe, coded_picture, write_video
 from tolerances import GRAY_LEVELS, RESIZED_LEVELS, SWSCALE_LEVELS
 
 from standoff.core.types import ImageArray, Picture
+from standoff.files.orientation import Orientation
 from standoff.stages.frames import ArrayPicture, AvPicture, Scaler, frame_from_array, open_source
-from standoff.stages.frames.orientation import Orientation
 from standoff.stages.frames.pictures import halved
 
 FORMATS = ["yuv420p", "yuvj420p", "yuv422p", "yuv444p", "nv12", "gray", "rgb24", "bgr24", "yuv420p10le", "rgba"]

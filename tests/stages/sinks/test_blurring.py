@@ -19,14 +19,14 @@ from tolerances import ENCODED_LEVELS
 
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import CameraMotion, Detections, FrameResult, ImageArray, Outcome, Tracks
+from standoff.drawing.text import TextSprites
 from standoff.stages.sinks import Composer, DrawParams, ReportParams, ReportSink, ShowParams, VideoParams, VideoSink
 from standoff.stages.sinks.birdseye import BirdsEye
 from standoff.stages.sinks.blurring import PeopleWatch, blur
 from standoff.stages.sinks.collect import RunSummary
-from standoff.stages.sinks.drawing import Overlay
+from standoff.stages.sinks.overlay import Overlay
 from standoff.stages.sinks.scene import Scene
 from standoff.stages.sinks.sketch import Sketch
-from standoff.stages.sinks.text import TextSprites
 
 SIZE = (640, 360)
 WHOLE = np.array([0.0, 0.0, *SIZE])

@@ -14,13 +14,12 @@ from stages.sinks.fake_site import FakeSite, ended, quiet
 
 from standoff.core.lengths import FEET, METRES, LengthUnit
 from standoff.core.types import FrameResult, ImageArray, Outcome
+from standoff.drawing.painter import Painter
+from standoff.drawing.text import TextSprites
 from standoff.stages.sinks import Composer, DrawParams, ReportParams, ReportSink, ShowParams, VideoParams
 from standoff.stages.sinks.birdseye import BirdsEye
-from standoff.stages.sinks.charts import read_in, themed_figure
-from standoff.stages.sinks.painter import Painter
 from standoff.stages.sinks.scene import Scene
 from standoff.stages.sinks.sketch import Sketch
-from standoff.stages.sinks.text import TextSprites
 
 FOOT_M = 0.3048
 PANEL = (420, 400)
@@ -75,32 +74,6 @@ def test_the_panels_scale_bar_is_as_long_as_it_says(
     # All else is dimmed: only the bar is as light as this.
     length_px = int((panel[bottom - 2 : bottom + 3].min(axis=2) > 190).any(axis=0).sum())
     assert length_px * window.m_per_px == pytest.approx(float(label.split()[0]) * unit.in_m, abs=3 * window.m_per_px)
-
-
-@pytest.mark.parametrize("unit", [METRES, FEET])
-def test_an_axis_is_marked_where_the_number_lies(unit: LengthUnit) -> None:
-    with themed_figure(6.0, 4.0) as figure:
-        axes = figure.add_subplot()
-        axes.set_ylim(-7.3, 61.0)
-        read_in(axes.yaxis, unit, "gap")
-        figure.draw_without_rendering()
-        ticks = list(axes.get_yticks())
-        labels = [label.get_text().replace("\N{MINUS SIGN}", "-") for label in axes.get_yticklabels()]
-    assert axes.get_ylabel() == f"gap, {unit.symbol}"
-    assert len(ticks) >= 4
-    for place_m, text in zip(ticks, labels, strict=True):
-        assert float(text) * unit.in_m == pytest.approx(place_m, abs=1e-9)
-        assert len(text.strip("-")) <= 4  # round in the unit that is read
-
-
-def test_in_metres_axes_are_marked_as_matplotlib_does() -> None:
-    with themed_figure(6.0, 4.0) as figure:
-        own, plain = figure.subplots(1, 2)
-        for axes in (own, plain):
-            axes.set_ylim(-7.3, 61.7)
-        read_in(own.yaxis, METRES, "gap")
-        figure.draw_without_rendering()
-        assert [one.get_text() for one in own.get_yticklabels()] == [one.get_text() for one in plain.get_yticklabels()]
 
 
 def test_a_report_in_feet_has_no_metres_but_those_that_it_translates(

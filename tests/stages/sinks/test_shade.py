@@ -31,14 +31,14 @@ from standoff.core.watched_ground import (
     cell_middles_px,
     cell_of,
 )
+from standoff.drawing.text import TextSprites
 from standoff.stages.hazard import HazardMonitor
 from standoff.stages.sinks import DrawParams, ReportParams, ReportSink
 from standoff.stages.sinks.birdseye import BirdsEye
-from standoff.stages.sinks.drawing import Overlay
+from standoff.stages.sinks.overlay import Overlay
 from standoff.stages.sinks.scene import Scene
 from standoff.stages.sinks.shade import PictureShade, diagonals
 from standoff.stages.sinks.sketch import Sketch
-from standoff.stages.sinks.text import TextSprites
 
 SIZE, PANEL = (640, 360), (300, 400)
 WHOLE = np.array([0.0, 0.0, 1.0, 1.0])

@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 from stages.sinks.fake_site import FakeSite
 
-from standoff.core.errors import MissingDependency
 from standoff.core.types import Outcome
 from standoff.stages.sinks import Composer, VideoParams, VideoSink
-from standoff.stages.sinks.encoder import available_encoder
 
 
 def _times(path: Path) -> list[float]:
@@ -90,14 +88,8 @@ def test_an_odd_sized_source_is_written(tmp_path: Path) -> None:
     assert len(_times(tmp_path / "annotated.mp4")) == 1
 
 
-def test_without_any_encoder_the_reader_is_told_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("standoff.stages.sinks.encoder._ENCODERS", ("no_such_encoder",))
-    with pytest.raises(MissingDependency, match=r"no_such_encoder.*pip install"):
-        available_encoder()
-
-
 def test_another_encoder_takes_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("standoff.stages.sinks.encoder._ENCODERS", ("no_such_encoder", "mpeg4"))
+    monkeypatch.setattr("standoff.drawing.encoder._ENCODERS", ("no_such_encoder", "mpeg4"))
     site, sink = FakeSite((320, 180)), VideoSink(tmp_path / "annotated.mp4")
     for result in site.results(10):
         sink.write(result)

@@ -27,6 +27,9 @@ from standoff.core.types import (
     Tracks,
 )
 from standoff.core.zones import Zone
+from standoff.drawing.ground_shapes import clip_to_box, outlines_in_sight_px
+from standoff.drawing.palette import bgr
+from standoff.drawing.text import TextSprites
 from standoff.stages.hazard import HazardMonitor
 from standoff.stages.sinks import (
     TRACKS,
@@ -38,12 +41,9 @@ from standoff.stages.sinks import (
     TableSink,
 )
 from standoff.stages.sinks.birdseye import BirdsEye
-from standoff.stages.sinks.drawing import Overlay
-from standoff.stages.sinks.ground_shapes import clip_to_box, outlines_in_sight_px
-from standoff.stages.sinks.palette import bgr
+from standoff.stages.sinks.overlay import Overlay
 from standoff.stages.sinks.scene import Scene
 from standoff.stages.sinks.sketch import Sketch
-from standoff.stages.sinks.text import TextSprites
 
 SIZE = (640, 360)
 LENS = Camera(*SIZE, np.array([[450.0, 0, 320], [0, 450, 180], [0, 0, 1]]), np.array([-0.2, 0.05, 0, 0, 0]))

@@ -15,7 +15,7 @@ from laws import few
 from training.conftest import DarknetFiles
 
 from standoff.core.errors import MissingDependency, ModelError, OutputError
-from standoff.stages.detect.model_card import ModelCard
+from standoff.stages.detect import ModelCard
 from standoff.training import export_darknet, yolov3_tiny_cfg
 from standoff.training.architectures import ARCHITECTURES
 from standoff.training.architectures.refitted import pointed_cfg

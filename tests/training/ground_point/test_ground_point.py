@@ -10,7 +10,7 @@ import pytest
 from standoff.core.errors import DataError
 from standoff.core.homography import FloatArray
 from standoff.core.types import ImageArray
-from standoff.stages.detect.point_crops import CROP_PX, POINT_CLASSES
+from standoff.stages.detect import POINT_CLASSES, POINT_CROP_PX
 from standoff.training.ground_point import Patches, PointTraining, measure_points, read_patches, train_points
 from standoff.training.ground_point.crops import PATCH_PX, drawn_crop, middle_crop
 from standoff.training.pictures.augment_params import AugmentParams
@@ -31,9 +31,9 @@ def dots(count: int, seed: int) -> Patches:
 
 
 def blob_middle(image: ImageArray) -> FloatArray:
-    columns, rows = np.meshgrid(np.arange(CROP_PX) + 0.5, np.arange(CROP_PX) + 0.5)
+    columns, rows = np.meshgrid(np.arange(POINT_CROP_PX) + 0.5, np.arange(POINT_CROP_PX) + 0.5)
     bright = image.max(axis=2) > 180
-    return np.array([columns[bright].mean(), rows[bright].mean()]) / CROP_PX
+    return np.array([columns[bright].mean(), rows[bright].mean()]) / POINT_CROP_PX
 
 
 def test_the_point_goes_with_what_is_seen() -> None:

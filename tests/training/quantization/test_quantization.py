@@ -18,12 +18,10 @@ from tolerances import HALF_WEIGHTS, INT8_SCORE
 
 from standoff.core.errors import DataError, ModelError, OutputError
 from standoff.core.finding import WorkerFinding
+from standoff.files.fingerprint import file_sha256
 from standoff.labels import LabelledData, LabelledPicture, Split, read_data
 from standoff.labels.site_classes import to_site_classes
-from standoff.stages.detect import DetectParams, OnnxDetector
-from standoff.stages.detect.letterbox import Letterbox
-from standoff.stages.detect.model_card import ModelCard, file_sha256
-from standoff.stages.detect.network import Network
+from standoff.stages.detect import DetectParams, Letterbox, ModelCard, Network, OnnxDetector
 from standoff.stages.frames import frame_from_array
 from standoff.training.quantization import quantize
 from standoff.training.quantization.gate import LEAST_TRUTHS, ClassLoss, Loss

@@ -20,7 +20,7 @@ from standoff.labels import LabelledData, Problem, read_data
 from standoff.labels.read import CUT_GROUP
 from standoff.labels.splits import spread
 from standoff.stages.detect import DetectParams, OnnxDetector
-from standoff.stages.frames.pictures import ArrayPicture
+from standoff.stages.frames import ArrayPicture
 from standoff.training.darknet.cfg import Yolo, parse_cfg, read_cfg
 from standoff.training.darknet.network import DarknetNetwork, DecodedNetwork
 from standoff.training.darknet.weights import load_weights

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
+from standoff.clips import PAIRS_FILE, read_clip_table
 from standoff.core.classes import CLASSES
 from standoff.core.homography import FloatArray
 from standoff.core.types import IntArray, TextArray
 from standoff.evaluation.beside_truth import BesideTruth, read_beside_truth
 from standoff.evaluation.coverage.site_frame import rests_on_reference, shared_turning
 from standoff.evaluation.matching import NOTHING
-from standoff.evaluation.pair_rows import PairRows, distances_of
-from standoff.evaluation.paper.clip_tables import PAIRS, read_table
+from standoff.evaluation.pair_rows import TRUE_PAIR_COLUMNS, PairRows, distances_of
 from standoff.evaluation.paper.turning import Turning
 from standoff.evaluation.positions_input import PAIR_COLUMNS, read_run_table
 
@@ -95,7 +95,7 @@ def read_samples(run: Path, clip: Path) -> ClipSamples:
 
 def _pairs(beside: BesideTruth, run: Path, clip: Path) -> PairSamples:
     truth, ends = beside.truth, beside.ends
-    table = read_table(clip / "pairs.parquet", PAIRS)
+    table = read_clip_table(clip, PAIRS_FILE, TRUE_PAIR_COLUMNS)
     rows = PairRows(table["frame"], table["entity_a"], table["entity_b"])
     listed = rows.find(truth["frame"][ends[0]], *(truth["entity_id"][end] for end in ends))
     # Vehicles parked in the street keep no distance to anybody.

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from standoff.clips import read_scene
 from standoff.core.homography import FloatArray
-from standoff.evaluation.paper.clip import read_scene
 from standoff.evaluation.paper.turning import Turning
 from standoff.stages.ground import ReferenceShape
 

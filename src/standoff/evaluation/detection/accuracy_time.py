@@ -13,9 +13,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from standoff.core.homography import FloatArray
+from standoff.drawing.file_charts import INK, blank, colour_of, tidy
 from standoff.evaluation.detection.coco import HEIGHT_BANDS_PX
 from standoff.evaluation.detection.comparison import Comparison
-from standoff.evaluation.detection.style import INK, blank, colour_of, tidy
 from standoff.evaluation.detection.trial import TrialResult
 
 _SIZED: Final = re.compile(r"(?P<network>.+?)[-_.](?P<size>\d+x\d+)(?P<slices> \d+x\d+)?")

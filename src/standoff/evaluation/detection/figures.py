@@ -9,10 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from standoff.core.errors import OutputError
+from standoff.drawing.file_charts import INK, QUIET, blank, colour_of, tidy
 from standoff.evaluation.detection.accuracy_time import draw_accuracy_time
 from standoff.evaluation.detection.comparison import Comparison
 from standoff.evaluation.detection.score import PRECISION, ClassScore
-from standoff.evaluation.detection.style import INK, QUIET, blank, colour_of, tidy
 from standoff.files.whole import whole_file
 
 _PANEL_IN = (3.4, 3.3)

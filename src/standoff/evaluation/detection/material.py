@@ -10,14 +10,13 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from standoff.clips import TRUTH_FILE, Clip, load_clip, read_clip_table
 from standoff.core.boxes import unknown_points
 from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.errors import ConfigError, DataError
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.pose import View
 from standoff.core.types import Frame, IntArray
-from standoff.evaluation.paper.clip import Clip, load_clip
-from standoff.evaluation.paper.clip_tables import read_table
 from standoff.evaluation.positions_input import read_truth
 from standoff.labels import load_picture, read_data
 from standoff.labels.marking import would_be_marked
@@ -123,7 +122,7 @@ def simulated_clip(folder: Path, limit: int | None = None) -> Material:
         SourceError: Its video cannot be read.
     """
     clip = load_clip(folder)
-    rows = read_table(folder / "truth.parquet", _VISIBLE)
+    rows = read_clip_table(folder, TRUTH_FILE, _VISIBLE)
     seen = rows["visible_px"] > 0
     boxes_px = np.column_stack([rows[name] for name in ("x1_px", "y1_px", "x2_px", "y2_px")]).astype(np.float64)
     foot_px = np.column_stack([rows["foot_x_px"], rows["foot_y_px"]]).astype(np.float64)
@@ -135,7 +134,7 @@ def simulated_clip(folder: Path, limit: int | None = None) -> Material:
         here = seen & (rows["frame"] == frame)
         boxes = _Boxes(boxes_px[here], rows["class_id"][here], ignored[here], foot_px[here])
         truth.append(_in_video(clip.video, size_px, boxes))
-    camera = load_camera(folder / "camera.yaml")
+    camera = load_camera(clip.camera_file)
     views = {
         position: GroundView(View(camera, clip.camera_m[frame], clip.site_to_camera[frame]), 0.0)
         for position, frame in enumerate(chosen.tolist())
@@ -205,7 +204,7 @@ def open_material(
         raise ConfigError(
             expected="a CSV table with --video and --frames", found=f"{path}", fix="leave --video and --frames out"
         )
-    if (path / "truth.parquet").is_file():
+    if (path / TRUTH_FILE).is_file():
         return simulated_clip(path, limit)
     return labelled_pictures(path, split, limit, on_picture)
 

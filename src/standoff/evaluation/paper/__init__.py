@@ -1,12 +1,12 @@
 """The paper's tests on clips with exact truth: every figure of the paper beside what this monitor measures.
 
-from standoff.evaluation.paper import Trial, evaluate_clip, load_clip
+from standoff.clips import load_clip
+from standoff.evaluation.paper import Trial, evaluate_clip
 
 for figure in evaluate_clip(load_clip("clips/mobile"), Trial(method="oriented")).figures():
     print(figure.label, figure.paper, figure.measured, figure.unit)
 """
 
-from standoff.evaluation.paper.clip import Clip, load_clip
 from standoff.evaluation.paper.pooled import PooledMap, pool
 from standoff.evaluation.paper.report import write_report
 from standoff.evaluation.paper.result import ClipResult, PaperFigure, evaluate_clip
@@ -15,13 +15,11 @@ from standoff.evaluation.paper.truth_detector import BoxError
 
 __all__ = [
     "BoxError",
-    "Clip",
     "ClipResult",
     "PaperFigure",
     "PooledMap",
     "Trial",
     "evaluate_clip",
-    "load_clip",
     "pool",
     "write_report",
 ]

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from standoff.clips import Clip
 from standoff.config import Settings
 from standoff.core.classes import CLASSES
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import IntArray, TextArray
-from standoff.evaluation.paper.clip import Clip
 from standoff.evaluation.paper.watch import Watched
 
 ANSWERS = ("danger", "warning", "clear", "unknown")

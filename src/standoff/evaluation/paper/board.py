@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from standoff.clips import Clip, TrueBoard
 from standoff.core.camera import Camera
 from standoff.core.homography import FloatArray
 from standoff.evaluation.checkerboard import CheckerboardResult, evaluate_views
-from standoff.evaluation.paper.clip import Clip, TrueBoard
 from standoff.evaluation.paper.watch import check_frame, open_clip_video
 from standoff.evaluation.rectification import FAILURE_PX
 from standoff.stages.ground import BoardView, find_corners, load_camera
@@ -78,7 +78,7 @@ def watch_board(clip: Clip, board: TrueBoard, on_frame: Callable[[], None] | Non
 def score_board(clip: Clip, board: TrueBoard, views: list[BoardView]) -> BoardScore:
     """Repeat the lab test on the found corners and on the true ones."""
     frames = len(views)
-    camera = load_camera(clip.folder / "camera.yaml")
+    camera = load_camera(clip.camera_file)
     size_px = views[0].image_size_px
     exact = [
         BoardView(_name(index), size_px, corners_px)

@@ -7,12 +7,12 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter
 
 from standoff.core.homography import BoolArray
+from standoff.drawing.page_charts import INK, MUTED, inline_svg, themed_figure
+from standoff.drawing.palette import HEX
 from standoff.evaluation.paper.board import BoardScore
 from standoff.evaluation.paper.pairs import PairSeries
 from standoff.evaluation.paper.watch import Watched
 from standoff.evaluation.rectification import FAILURE_PX
-from standoff.stages.sinks.charts import INK, MUTED, inline_svg, themed_figure
-from standoff.stages.sinks.palette import HEX
 
 ESTIMATE, RAW, TREND = HEX["worker"], HEX["warning"], HEX["machine"]
 _HEADROOM = 0.35

@@ -6,13 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from standoff.clips import Clip, TrueReference
 from standoff.core.classes import CLASSES
 from standoff.core.homography import FloatArray
-from standoff.evaluation.paper.clip import Clip, TrueReference
 from standoff.evaluation.paper.metrics import ale_m
 from standoff.evaluation.paper.watch import Watched
-from standoff.stages.ground.reference import rectified_scale_m_per_px
-from standoff.stages.ground.shape import ReferenceShape
+from standoff.stages.ground import ReferenceShape, rectified_scale_m_per_px
 
 
 @dataclass(frozen=True, slots=True)

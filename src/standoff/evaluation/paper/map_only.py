@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from standoff.clips import Clip
 from standoff.core.homography import FloatArray
-from standoff.evaluation.paper.clip import Clip, inside
 from standoff.evaluation.paper.mapped_points import MappedPoints
 from standoff.evaluation.paper.watch import Watched
 from standoff.evaluation.stated_errors import plane_sigmas, plane_sigmas2_around
@@ -128,7 +128,7 @@ def score_map(clip: Clip, watched: Watched) -> MapScore:
     """Score the map of every frame, of a clip with a reference object."""
     assert clip.reference is not None
     without = ~np.isfinite(watched.scale_m_per_px)
-    seen = inside(clip.reference, watched.size_px) & (clip.reference.visible_share > 0.0)
+    seen = clip.reference.inside(watched.size_px) & (clip.reference.visible_share > 0.0)
     since_seen = np.logical_or.accumulate(seen)
     return MapScore(
         frames=len(without),

@@ -7,11 +7,11 @@ from typing import Self
 
 import numpy as np
 
+from standoff.clips import Clip
 from standoff.core.homography import FloatArray
 from standoff.core.map_error import map_jacobian
 from standoff.core.pose import View
 from standoff.core.types import GroundMap
-from standoff.evaluation.paper.clip import Clip
 from standoff.evaluation.paper.turning import Turning
 from standoff.stages.ground import load_camera
 
@@ -62,7 +62,7 @@ def level_feet_px(clip: Clip) -> FloatArray:
         GroundError: The clip's camera file is broken.
     """
     assert clip.reference is not None, "only such clips have a map"
-    camera = load_camera(clip.folder / "camera.yaml")
+    camera = load_camera(clip.camera_file)
     feet_px = np.full_like(clip.xy_m, np.nan)
     for frame, xy_m in enumerate(clip.xy_m):
         view = View(camera, clip.camera_m[frame], clip.site_to_camera[frame])

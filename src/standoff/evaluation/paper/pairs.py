@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from standoff.clips import Clip
 from standoff.core.classes import CLASSES
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import TextArray
 from standoff.evaluation.paper.benchmark_polynomial import Benchmark, fit_benchmark
-from standoff.evaluation.paper.clip import Clip
 from standoff.evaluation.paper.metrics import DistanceScore, fill_as_the_filter, score_distances
 from standoff.evaluation.paper.rectified import failed_frames
 from standoff.evaluation.paper.watch import Watched

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from standoff.clips import TrueReference
 from standoff.core.homography import BoolArray, FloatArray
-from standoff.evaluation.paper.clip import TrueReference, inside
 from standoff.evaluation.paper.watch import WRONG, Watched, is_wrong
 
 
@@ -71,7 +71,7 @@ def score_rectification(watched: Watched, reference: TrueReference) -> Rectifica
 
 def failed_frames(watched: Watched, reference: TrueReference) -> BoolArray:
     """Return (F,) which frames have a wrong map, or none although the reference is in sight."""
-    in_sight = inside(reference, watched.size_px) & (reference.visible_share > 0.0)
+    in_sight = reference.inside(watched.size_px) & (reference.visible_share > 0.0)
     return wrong_frames(watched) | (~np.isfinite(watched.scale_m_per_px) & in_sight)
 
 

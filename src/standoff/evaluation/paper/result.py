@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from standoff.clips import Clip
 from standoff.evaluation.paper.answers import FrameByFrame, score_frames
 from standoff.evaluation.paper.board import BoardScore, score_board, watch_board
-from standoff.evaluation.paper.clip import Clip
 from standoff.evaluation.paper.localisation import ClassScore, score_localisation
 from standoff.evaluation.paper.map_only import MapScore, score_map
 from standoff.evaluation.paper.pairs import (

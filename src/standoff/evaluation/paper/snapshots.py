@@ -9,8 +9,8 @@ import numpy as np
 
 from standoff.core.homography import FloatArray
 from standoff.core.types import Frame, GroundMap, ImageArray
-from standoff.stages.sinks.ground_window import camera_up, rectify, seen_ground_m, window_around
-from standoff.stages.sinks.palette import Tone, bgr
+from standoff.drawing.ground_window import camera_up, rectify, seen_ground_m, window_around
+from standoff.drawing.palette import Tone, bgr
 
 _MOST_FAILURES = 4
 _CROP_PX = (420, 300)

@@ -8,18 +8,16 @@ from typing import Any, Literal
 
 import numpy as np
 
-from standoff.clips import is_recording
+from standoff.clips import Clip, TrueReference, is_recording
 from standoff.config import Settings, build_stage, build_watcher, load_settings
 from standoff.core.errors import DataError
 from standoff.core.protocols import Detector, Tracker
-from standoff.evaluation.paper.clip import Clip, TrueReference
 from standoff.evaluation.paper.truth_detector import REFERENCE_MARGIN_PX, BoxError, TrueBoxes
 from standoff.monitor import Monitor
 from standoff.stages.detect import RecordedDetector
 from standoff.stages.frames import Source
-from standoff.stages.ground import ReferenceShape, ScaleWatch
-from standoff.stages.ground.params import ReferenceMethod
-from standoff.stages.locate.params import Anchor, LocateParams
+from standoff.stages.ground import ReferenceMethod, ReferenceShape, ScaleWatch
+from standoff.stages.locate import Anchor, LocateParams
 from standoff.stages.proximity import ProximityParams
 
 CameraKnowledge = Literal["file", "unknown"]
@@ -142,7 +140,7 @@ def settings_for(clip: Clip, trial: Trial) -> Settings:
     height = {} if trial.height == "known" else {"height_m": None}
     ground: dict[str, Any] = {
         "reference": {"params": {"method": trial.method}, **place, **height},
-        "camera": str(clip.folder / "camera.yaml") if trial.knows_lens else None,
+        "camera": str(clip.camera_file) if trial.knows_lens else None,
     }
     overrides: dict[str, Any] = {
         "ground": ground,
@@ -151,7 +149,7 @@ def settings_for(clip: Clip, trial: Trial) -> Settings:
     }
     if isinstance(trial.detector, Path):
         overrides["detections" if is_recording(trial.detector) else "model"] = str(trial.detector)
-    return load_settings(clip.folder / "reference.yaml", overrides)
+    return load_settings(clip.settings_file, overrides)
 
 
 def _first_corner_px(clip: Clip, reference: TrueReference) -> list[float] | None:

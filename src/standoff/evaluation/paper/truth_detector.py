@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from standoff.clips import Clip
 from standoff.core import protocols
 from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.homography import FloatArray
 from standoff.core.protocols import AnyGround, AnyMotion
 from standoff.core.types import Detections, Frame, Tracks
-from standoff.evaluation.paper.clip import Clip
 
 REFERENCE_MARGIN_PX = 3.0
 """The reference's box is drawn this much wide of it, as people draw boxes; the paper looks for edges inside only."""

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from standoff.clips import Clip
 from standoff.config import Settings
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import IntArray
 from standoff.evaluation.paper.answers import both_radii_m, seen_together
-from standoff.evaluation.paper.clip import Clip
 from standoff.evaluation.paper.watch import Watched
 
 AHEAD_S = 2.0

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
+from standoff.clips import Clip
 from standoff.core.errors import DataError
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import FrameResult, GroundMap, IntArray, NoGroundMap, TextArray
 from standoff.evaluation.matching import NOTHING, match_boxes
-from standoff.evaluation.paper.clip import Clip, inside
 from standoff.evaluation.paper.mapped_points import MappedPoints, level_feet_px
 from standoff.evaluation.paper.said import SaidOfPairs
 from standoff.evaluation.paper.snapshots import Snapshots
@@ -177,7 +177,7 @@ class Notes:
         self.taken = 0
         self._clip, self._true_px = clip, clip.reference.corners_px
         self._level_px = level_feet_px(clip)
-        self._in_picture = inside(clip.reference, size_px)
+        self._in_picture = clip.reference.inside(size_px)
         self._turn = 0
         self._turning = Turning(shape, clip.reference.corners_m)
         self._true_ids = true_ids

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from standoff.clips import PAIRS_FILE, read_clip_table
 from standoff.core.classes import CLASSES
 from standoff.core.errors import DataError
 from standoff.core.finding import WorkerFinding
@@ -15,8 +16,7 @@ from standoff.core.types import IntArray
 from standoff.core.watched_ground import COLUMNS, ROWS, cell_of
 from standoff.evaluation.beside_truth import WHOLE, BesideTruth, read_beside_truth
 from standoff.evaluation.matching import NOTHING
-from standoff.evaluation.pair_rows import PairRows, distances_of
-from standoff.evaluation.paper.clip_tables import PAIRS, read_table
+from standoff.evaluation.pair_rows import TRUE_PAIR_COLUMNS, PairRows, distances_of
 from standoff.evaluation.positions_input import PAIR_COLUMNS, read_run_table
 
 _RADIUS_M = np.array([site_class.action_radius_m for site_class in CLASSES])
@@ -106,7 +106,7 @@ def _cells(column: FloatArray, run: Path) -> IntArray:
 def _breaches(beside: BesideTruth, run: Path, clip: Path) -> tuple[BoolArray, BoolArray]:
     """Return (T,) whether each person is in a breach, and whether a breach of his is called clear."""
     truth, (people, machines) = beside.truth, beside.ends
-    table = read_table(clip / "pairs.parquet", PAIRS)
+    table = read_clip_table(clip, PAIRS_FILE, TRUE_PAIR_COLUMNS)
     frame, ids = truth["frame"][people], truth["entity_id"]
     row = PairRows(table["frame"], table["entity_a"], table["entity_b"]).find(frame, ids[people], ids[machines])
     radii_m = _RADIUS_M[truth["class_id"][people]] + _RADIUS_M[truth["class_id"][machines]]

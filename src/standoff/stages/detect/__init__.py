@@ -5,22 +5,53 @@
 >>> detections = detector.detect(frame)  # doctest: +SKIP
 """
 
-from standoff.stages.detect.class_map import DEFAULT_CLASS_MAP
+from standoff.stages.detect.candidates import Candidates
+from standoff.stages.detect.decoded_rows import detections_in_rows
 from standoff.stages.detect.detector import OnnxDetector
-from standoff.stages.detect.params import DetectParams
+from standoff.stages.detect.letterbox import Letterbox, resize
+from standoff.stages.detect.model_card import BOXES_OUTPUT, PICTURE_INPUT, POINTS_OUTPUT, ModelCard
+from standoff.stages.detect.network import Network
+from standoff.stages.detect.params import DetectParams, Provider
+from standoff.stages.detect.point_crops import (
+    POINT_CLASSES,
+    POINT_CROP_AROUND,
+    POINT_CROP_PX,
+    point_crop,
+    point_squares_px,
+)
+from standoff.stages.detect.point_network import CLASS_INPUT, CROPS_INPUT, point_metadata
 from standoff.stages.detect.recorded import RecordedDetector
-from standoff.stages.detect.runtime import available_providers
+from standoff.stages.detect.runtime import ONNX_ERRORS, available_providers, open_session
 from standoff.stages.detect.shared import SharedDetector
 from standoff.stages.detect.shipped import SHIPPED_MODELS, ShippedModel, find_model
 
 __all__ = [
-    "DEFAULT_CLASS_MAP",
+    "BOXES_OUTPUT",
+    "CLASS_INPUT",
+    "CROPS_INPUT",
+    "ONNX_ERRORS",
+    "PICTURE_INPUT",
+    "POINTS_OUTPUT",
+    "POINT_CLASSES",
+    "POINT_CROP_AROUND",
+    "POINT_CROP_PX",
     "SHIPPED_MODELS",
+    "Candidates",
     "DetectParams",
+    "Letterbox",
+    "ModelCard",
+    "Network",
     "OnnxDetector",
+    "Provider",
     "RecordedDetector",
     "SharedDetector",
     "ShippedModel",
     "available_providers",
+    "detections_in_rows",
     "find_model",
+    "open_session",
+    "point_crop",
+    "point_metadata",
+    "point_squares_px",
+    "resize",
 ]

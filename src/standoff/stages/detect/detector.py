@@ -10,15 +10,15 @@ import numpy as np
 import onnxruntime
 
 from standoff.core import protocols
+from standoff.core.class_map import map_classes
 from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.finding import KEY
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import Detections, Frame, ImageArray, IntArray
+from standoff.files.fingerprint import file_sha256
 from standoff.stages.detect.candidates import Candidates
-from standoff.stages.detect.class_map import map_classes
 from standoff.stages.detect.feet import feet_of
 from standoff.stages.detect.letterbox import Letterbox, resize
-from standoff.stages.detect.model_card import file_sha256
 from standoff.stages.detect.network import Network
 from standoff.stages.detect.params import DetectParams
 from standoff.stages.detect.point_network import PointNetwork

@@ -11,7 +11,7 @@ import onnxruntime
 
 from standoff.core.errors import ModelError
 from standoff.stages.detect.interface import Family
-from standoff.stages.detect.model_card import INPUT_NAME, OUTPUT_NAME, POINTS_NAME, ModelCard
+from standoff.stages.detect.model_card import BOXES_OUTPUT, PICTURE_INPUT, POINTS_OUTPUT, ModelCard
 
 _PICTURE_TYPES: Final[dict[str, type[np.generic]]] = {
     "tensor(float)": np.float32,
@@ -100,10 +100,10 @@ def check_own_graph(session: onnxruntime.InferenceSession, card: ModelCard, name
     """
     width_px, height_px = card.input_size_px
     found = {node.name: node.shape for node in (*session.get_inputs(), *session.get_outputs())}
-    rows = next(iter(found.get(OUTPUT_NAME, [])[1:2]), "N")
-    expected = {INPUT_NAME: [1, 3, height_px, width_px], OUTPUT_NAME: [1, rows, _YOLO_COLUMNS + len(card.classes)]}
-    if POINTS_NAME in found:
-        expected[POINTS_NAME] = [1, rows, _POINT_COLUMNS]
+    rows = next(iter(found.get(BOXES_OUTPUT, [])[1:2]), "N")
+    expected = {PICTURE_INPUT: [1, 3, height_px, width_px], BOXES_OUTPUT: [1, rows, _YOLO_COLUMNS + len(card.classes)]}
+    if POINTS_OUTPUT in found:
+        expected[POINTS_OUTPUT] = [1, rows, _POINT_COLUMNS]
     if found != expected:
         raise ModelError(
             expected=f"the tensors {expected} in {name}, as its metadata says",

@@ -14,11 +14,9 @@ has one input, and one output or two:
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, Final
 
 from standoff.core.errors import ModelError
@@ -26,9 +24,9 @@ from standoff.core.finding import KEY as FINDS_WORKERS
 
 FORMAT_KEY: Final = "standoff_format"
 FORMAT: Final = "1"
-INPUT_NAME: Final = "picture"
-OUTPUT_NAME: Final = "boxes"
-POINTS_NAME: Final = "points"
+PICTURE_INPUT: Final = "picture"
+BOXES_OUTPUT: Final = "boxes"
+POINTS_OUTPUT: Final = "points"
 PREPROCESSING: Final = {"colour": "RGB", "divide_by": 255, "letterbox_grey": 0.5}
 OUTPUT_COLUMNS: Final = ("centre_x_px", "centre_y_px", "width_px", "height_px", "objectness", "class probabilities")
 _FIX: Final = "make the file with `standoff export`"
@@ -126,9 +124,3 @@ def _rising(told: Mapping[str, Sequence[float]]) -> dict[str, tuple[float, ...]]
     if not all(0.0 <= share <= 1.0 for share in shares):
         raise ValueError(f"{FINDS_WORKERS} with shares outside 0 to 1")
     return {"height_px": heights, "share": shares}
-
-
-def file_sha256(path: Path) -> str:
-    """Return the SHA-256 of a file's content, in hexadecimal."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -20,7 +20,7 @@ from standoff.stages.detect.foreign import Foreigner
 from standoff.stages.detect.graph import GraphInputs, check_own_graph, suggested_description
 from standoff.stages.detect.interface import Interface
 from standoff.stages.detect.letterbox import Letterbox, Preprocessing
-from standoff.stages.detect.model_card import FORMAT_KEY, OUTPUT_NAME, POINTS_NAME, ModelCard
+from standoff.stages.detect.model_card import BOXES_OUTPUT, FORMAT_KEY, POINTS_OUTPUT, ModelCard
 from standoff.stages.detect.outputs import read_rows
 from standoff.stages.detect.params import Provider
 from standoff.stages.detect.runtime import ONNX_ERRORS, open_session, told_by_runtime
@@ -115,8 +115,8 @@ class Network:
         return outputs
 
     def _own_reader(self) -> OutputReader:
-        has_points = POINTS_NAME in {node.name for node in self._session.get_outputs()}
-        return OutputReader((OUTPUT_NAME, POINTS_NAME) if has_points else (OUTPUT_NAME,), read_rows)
+        has_points = POINTS_OUTPUT in {node.name for node in self._session.get_outputs()}
+        return OutputReader((BOXES_OUTPUT, POINTS_OUTPUT) if has_points else (BOXES_OUTPUT,), read_rows)
 
     def _own_unreadable(self, error: UnreadableOutputs) -> ModelError:
         fix = "export the model again from sound weights"

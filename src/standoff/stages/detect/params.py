@@ -7,9 +7,9 @@ from typing import Annotated, Literal
 from annotated_types import Ge, Interval
 from typing_extensions import Doc
 
+from standoff.core.class_map import IGNORE
 from standoff.core.classes import CLASS_BY_NAME
 
-IGNORE = "ignore"
 Provider = Literal["auto", "cpu", "cuda", "tensorrt", "openvino"]
 
 

@@ -11,9 +11,9 @@ from standoff.core.classes import CLASSES, Role
 from standoff.core.homography import FloatArray
 from standoff.core.types import ImageArray, IntArray
 
-CROP_PX: Final = 96
+POINT_CROP_PX: Final = 96
 """Side of what the network sees."""
-AROUND: Final = 1.4
+POINT_CROP_AROUND: Final = 1.4
 """Side of the square in the picture, in longer sides of the box."""
 POINT_CLASSES: Final = tuple(one.name for one in CLASSES if one.role is not Role.REFERENCE)
 """Whose ground points the network tells, in the order of its `class_index`."""
@@ -21,7 +21,7 @@ POINT_CLASSES: Final = tuple(one.name for one in CLASSES if one.role is not Role
 _LEAST_SIDE_PX: Final = 4
 
 
-def squares_px(xyxy_px: FloatArray, around: float = AROUND) -> IntArray:
+def point_squares_px(xyxy_px: FloatArray, around: float = POINT_CROP_AROUND) -> IntArray:
     """Return the square about each box.
 
     Args:
@@ -37,12 +37,12 @@ def squares_px(xyxy_px: FloatArray, around: float = AROUND) -> IntArray:
     return np.column_stack([corner_px, side_px]).astype(np.int64)
 
 
-def crop(image: ImageArray, square_px: IntArray, size_px: int = CROP_PX) -> ImageArray:
+def point_crop(image: ImageArray, square_px: IntArray, size_px: int = POINT_CROP_PX) -> ImageArray:
     """Cut one square out of a picture and scale it; what lies outside repeats the picture's edge.
 
     Args:
         image: (H, W, 3).
-        square_px: (3,) of `squares_px`.
+        square_px: (3,) of `point_squares_px`.
         size_px: Side of the result.
 
     Returns:

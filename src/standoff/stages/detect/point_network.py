@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
@@ -13,22 +14,31 @@ from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.errors import ModelError
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import ImageArray, IntArray
+from standoff.stages.detect.model_card import POINTS_OUTPUT
 from standoff.stages.detect.params import Provider
-from standoff.stages.detect.point_crops import POINT_CLASSES, crop, squares_px
+from standoff.stages.detect.point_crops import POINT_CLASSES, point_crop, point_squares_px
 from standoff.stages.detect.runtime import ONNX_ERRORS, open_session, told_by_runtime
 
-FORMAT_KEY: Final = "standoff_ground_points"
-FORMAT: Final = "1"
+_FORMAT_KEY: Final = "standoff_ground_points"
+_FORMAT: Final = "1"
 TELLS_KEY: Final = "tells"
 """In the metadata: the classes of which the network is asked; left out or empty: all that it has learnt."""
 CROPS_INPUT: Final = "crops"
 CLASS_INPUT: Final = "class_index"
-POINTS_OUTPUT: Final = "points"
 
 _CUT_OFF_TIMES: Final = 2.0
 """How much larger the errors are of what goes on outside the picture than the network says: 1.9 times where rendered
 scenes of the split `val` have 38 such boxes."""
 _EDGE_PX: Final = 2.0
+
+
+def point_metadata(tells: Sequence[str]) -> dict[str, str]:
+    """Return the texts by which a file is known as a network of ground points.
+
+    Args:
+        tells: Classes of which it will be asked; empty: all.
+    """
+    return {_FORMAT_KEY: _FORMAT, "classes": json.dumps(POINT_CLASSES), TELLS_KEY: json.dumps(list(tells))}
 
 
 class PointNetwork:
@@ -48,10 +58,10 @@ class PointNetwork:
         self._session = open_session(path, provider, intra_op_threads)
         self._name = path.name
         texts = self._session.get_modelmeta().custom_metadata_map
-        if texts.get(FORMAT_KEY) != FORMAT or json.loads(texts.get("classes", "[]")) != list(POINT_CLASSES):
+        if texts.get(_FORMAT_KEY) != _FORMAT or json.loads(texts.get("classes", "[]")) != list(POINT_CLASSES):
             raise ModelError(
                 expected=f"a network of ground points at {path}",
-                found="another one" if FORMAT_KEY not in texts else "one of another version of standoff",
+                found="another one" if _FORMAT_KEY not in texts else "one of another version of standoff",
                 fix="make it with `standoff train-points`, or leave detect.ground_points out",
             )
         self._index_of_class = np.full(len(CLASS_BY_NAME), -1)
@@ -76,8 +86,8 @@ class PointNetwork:
         rows = np.flatnonzero(self._index_of_class[class_id] >= 0)
         if not len(rows):
             return points, sigma
-        squares = squares_px(xyxy_px[rows])
-        crops = np.stack([crop(image, square) for square in squares])[..., ::-1]
+        squares = point_squares_px(xyxy_px[rows])
+        crops = np.stack([point_crop(image, square) for square in squares])[..., ::-1]
         feed = {
             CROPS_INPUT: np.ascontiguousarray(crops.transpose(0, 3, 1, 2), dtype=np.float32) / np.float32(255.0),
             CLASS_INPUT: self._index_of_class[class_id[rows]],

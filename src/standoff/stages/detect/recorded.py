@@ -10,7 +10,7 @@ from standoff.clips import RecordedDetections, read_detections
 from standoff.core import protocols
 from standoff.core.errors import DataError
 from standoff.core.types import Detections, Frame
-from standoff.stages.detect.model_card import file_sha256
+from standoff.files.fingerprint import file_sha256
 
 _SAME_TIME_S: Final = 1e-6
 """Two readings of one timestamp differ by the rounding of a subtraction; two frames by a thousand times as much."""

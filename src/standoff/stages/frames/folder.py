@@ -12,11 +12,11 @@ from typing import Any
 import av
 
 from standoff.core.errors import SourceError
+from standoff.files.fingerprint import fingerprint
+from standoff.files.orientation import UPRIGHT, Orientation
+from standoff.files.picture_header import PictureHeader, UnreadablePicture, read_whole_header
 from standoff.stages.frames.album import read_album
-from standoff.stages.frames.fingerprint import fingerprint
-from standoff.stages.frames.orientation import UPRIGHT, Orientation
 from standoff.stages.frames.photograph import read_photograph
-from standoff.stages.frames.picture_header import PictureHeader, UnreadablePicture, read_whole_header
 from standoff.stages.frames.pictures import AvPicture, Scaler
 from standoff.stages.frames.reader import Selection, Shot, check_size, size_changed
 

@@ -12,7 +12,7 @@ import numpy as np
 from av.video.reformatter import VideoReformatter
 
 from standoff.core.types import ImageArray, Luma
-from standoff.stages.frames.orientation import UPRIGHT, Orientation
+from standoff.files.orientation import UPRIGHT, Orientation
 from standoff.stages.frames.pixel_shape import square_size_px
 
 _EIGHT_BIT_LUMA_FIRST = frozenset(

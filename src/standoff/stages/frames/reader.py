@@ -12,8 +12,8 @@ from standoff.core.camera import CameraPrior
 from standoff.core.errors import FrameSizeChanged, SourceError
 from standoff.core.telemetry import Telemetry
 from standoff.core.types import Picture
+from standoff.files.orientation import Orientation
 from standoff.stages.frames.drone_cameras import DroneCamera
-from standoff.stages.frames.orientation import Orientation
 
 TIME_ROUNDING_S = 1e-6
 """A picture this little before a limit counts as on it: 0.3 s in floating point lies beyond 3 ticks of 0.1 s."""

@@ -13,9 +13,10 @@ import av
 
 from standoff.core.camera import CameraPrior
 from standoff.core.errors import SourceError, SourceTruncated
+from standoff.files.fingerprint import fingerprint
+from standoff.files.orientation import Orientation
 from standoff.stages.frames.container import Header, describe_streams, not_a_video, open_video, passed_over
-from standoff.stages.frames.fingerprint import fingerprint
-from standoff.stages.frames.orientation import Orientation, display_orientation
+from standoff.stages.frames.display_orientation import display_orientation
 from standoff.stages.frames.pictures import AvPicture, Scaler
 from standoff.stages.frames.pixel_shape import square_size_px
 from standoff.stages.frames.prior import drone_prior, find_drone

@@ -1,6 +1,12 @@
 """How far apart people and machines are: GroundPositions in, Proximities out."""
 
+from standoff.stages.proximity.excuses import Excuses
 from standoff.stages.proximity.meter import ProximityMeter, side_classes
 from standoff.stages.proximity.params import ProximityParams
 
-__all__ = ["ProximityMeter", "ProximityParams", "side_classes"]
+__all__ = [
+    "Excuses",
+    "ProximityMeter",
+    "ProximityParams",
+    "side_classes",
+]

@@ -6,6 +6,7 @@ from standoff.stages.sinks.hazards import HazardSink
 from standoff.stages.sinks.make import Wanted, make_sink
 from standoff.stages.sinks.params import DrawParams, ReportParams, ShowParams, TableParams, VideoParams
 from standoff.stages.sinks.report import ReportSink
+from standoff.stages.sinks.scene import Scene
 from standoff.stages.sinks.tables import (
     DETECTIONS,
     FRAMES,
@@ -29,6 +30,7 @@ __all__ = [
     "HazardSink",
     "ReportParams",
     "ReportSink",
+    "Scene",
     "ShowParams",
     "Table",
     "TableParams",

@@ -8,15 +8,15 @@ import numpy as np
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.lengths import LengthUnit
 from standoff.core.types import GroundMap, ImageArray, NoGroundMap
+from standoff.drawing.ground_window import GroundWindow, camera_up, rectify, seen_ground_m, window_around
+from standoff.drawing.painter import Painter
+from standoff.drawing.palette import bgr
+from standoff.drawing.text import TextSprites
 from standoff.stages.sinks.fans import FAN_OPACITY
-from standoff.stages.sinks.ground_window import GroundWindow, camera_up, rectify, seen_ground_m, window_around
-from standoff.stages.sinks.painter import Painter
-from standoff.stages.sinks.palette import bgr
 from standoff.stages.sinks.params import DrawParams
 from standoff.stages.sinks.scene import Scene
 from standoff.stages.sinks.shade import GroundShade, diagonals
 from standoff.stages.sinks.sketch import Sketch
-from standoff.stages.sinks.text import TextSprites
 from standoff.stages.sinks.zone_drawing import ZoneDrawing
 
 _OUTSIDE_FOR_S = 2.0

@@ -1,62 +1,30 @@
-"""The report's figures as inline SVG that follows the page's light or dark colours."""
+"""The report's charts: of gaps, distances and watched ground over time, and the plan from above."""
 
 from __future__ import annotations
 
-import io
-import re
-from collections.abc import Iterator
-from contextlib import contextmanager
-from typing import Any
-
 import cv2
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.axis import Axis
-from matplotlib.backends.backend_svg import FigureCanvasSVG
-from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Outline
-from matplotlib.ticker import AutoLocator, FuncFormatter, MaxNLocator, ScalarFormatter
+from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from standoff.core.homography import FloatArray
-from standoff.core.lengths import LengthUnit
 from standoff.core.types import ImageArray
 from standoff.core.zones import Zone, ZoneKind, ring_middle
+from standoff.drawing.ground_shapes import clip_to_box
+from standoff.drawing.ground_window import rectify, window_around
+from standoff.drawing.page_charts import INK, MUTED, SURFACE, inline_svg, read_in, themed_figure
+from standoff.drawing.palette import HEX, class_tone
 from standoff.stages.sinks.collect import RunSummary
-from standoff.stages.sinks.ground_shapes import clip_to_box
-from standoff.stages.sinks.ground_window import rectify, window_around
-from standoff.stages.sinks.palette import HEX, class_tone
 from standoff.stages.sinks.series import Path, Series
 from standoff.stages.sinks.zone_drawing import largest_part
 
-INK, MUTED = "#010203", "#040506"
-"""Stand-ins for the colours of text and of what matters less, which `inline_svg` replaces by the page's own."""
-
-_SURFACE = "#070809"
 _FAINT_PAIRS = 20
 _PANELS = 6
 _PLAN_PX = 520
 _HATCH: dict[ZoneKind, str] = {"no_go": "///", "machine_only": "...", "crossing": "---"}
 _FIRST, _ON, _LAST = Outline.MOVETO, Outline.LINETO, Outline.CLOSEPOLY
-_STYLE: dict[Any, Any] = {
-    "svg.fonttype": "none",
-    "font.family": "sans-serif",
-    "font.size": 9.0,
-    "text.color": INK,
-    "axes.edgecolor": MUTED,
-    "axes.labelcolor": INK,
-    "axes.facecolor": "none",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "xtick.color": INK,
-    "ytick.color": INK,
-    "grid.color": MUTED,
-    "grid.alpha": 0.3,
-    "grid.linewidth": 0.6,
-    "figure.facecolor": "none",
-    "svg.hashsalt": "standoff",
-}
 
 
 def clock(time_s: float, _position: object = None) -> str:
@@ -71,60 +39,6 @@ def clock(time_s: float, _position: object = None) -> str:
         return "unknown"
     minutes, seconds = divmod(round(time_s, 1), 60.0)
     return f"{int(minutes)}:{seconds:04.1f}"
-
-
-class _RoundIn(AutoLocator):
-    """Ticks of an axis in metres where another unit has round numbers."""
-
-    def __init__(self, unit: LengthUnit) -> None:
-        super().__init__()
-        self._in_m = unit.in_m
-
-    def tick_values(self, vmin: float, vmax: float) -> list[float]:
-        """Return their places."""
-        return [value * self._in_m for value in super().tick_values(vmin / self._in_m, vmax / self._in_m)]
-
-
-class _WrittenIn(ScalarFormatter):
-    """Numbers of an axis in metres, in another unit."""
-
-    def __init__(self, unit: LengthUnit) -> None:
-        super().__init__(useOffset=False)
-        self._in_m = unit.in_m
-
-    def set_locs(self, locs: list[float]) -> None:
-        """Take all places that are going to be written at."""
-        super().set_locs([place / self._in_m for place in locs])
-
-    def __call__(self, x: float, pos: int | None = None) -> str:
-        return super().__call__(x / self._in_m, pos)
-
-
-def read_in(axis: Axis, unit: LengthUnit, what: str) -> None:
-    """Let an axis whose data are in metres be read in a unit; what is drawn on it stays in metres."""
-    axis.set_major_locator(_RoundIn(unit))
-    axis.set_major_formatter(_WrittenIn(unit))
-    axis.set_label_text(f"{what}, {unit.symbol}")
-
-
-@contextmanager
-def themed_figure(width_in: float, height_in: float) -> Iterator[Figure]:
-    """Give a figure in the report's style; draw on it and call `inline_svg` before leaving."""
-    with mpl.rc_context(_STYLE):
-        yield Figure(figsize=(width_in, height_in), layout="constrained")
-
-
-def inline_svg(figure: Figure) -> str:
-    """Return the figure as an SVG element without prolog, links or fixed size, in the page's colours."""
-    text = io.StringIO()
-    # `figure.savefig` gives the same, and draws everything twice
-    FigureCanvasSVG(figure).print_svg(text, metadata={"Date": None})  # type: ignore[no-untyped-call]
-    svg = re.sub(r"<metadata>.*?</metadata>", "", text.getvalue(), flags=re.DOTALL)
-    head, body = svg[svg.index("<svg") :].split(">", 1)
-    svg = re.sub(r' (width|height|xmlns:xlink)="[^"]*"', "", head) + ">" + body.replace("xlink:href", "href")
-    for stand_in, name in ((INK, "--ink"), (MUTED, "--muted"), (_SURFACE, "--surface")):
-        svg = svg.replace(stand_in, f"var({name})")
-    return svg
 
 
 def site_chart(summary: RunSummary, warning_gap_m: float) -> str:
@@ -240,7 +154,7 @@ def _plot_zone(axes: Axes, zone: Zone, low: FloatArray, high: FloatArray) -> Non
     axes.add_patch(PathPatch(Outline(corners, codes), facecolor="none", **style))
     part = largest_part([clip_to_box(outer, low, high) for outer, *_ in zone.polygons_m])
     if part is not None:
-        box = {"facecolor": _SURFACE, "edgecolor": HEX["zone"], "pad": 2.0, "linewidth": 0.8}
+        box = {"facecolor": SURFACE, "edgecolor": HEX["zone"], "pad": 2.0, "linewidth": 0.8}
         x_m, y_m = ring_middle(part).tolist()
         axes.annotate(zone.title, (x_m, y_m), ha="center", va="center", fontsize=8, bbox=box, zorder=2.5)
 
@@ -249,10 +163,10 @@ def _plot_path(axes: Axes, path: Path) -> None:
     points = path.points_m
     placed = points[np.isfinite(points[:, 0])]
     colour = HEX[class_tone(path.class_id)]
-    axes.plot(*points.T, color=_SURFACE, linewidth=3.2, alpha=0.7)
+    axes.plot(*points.T, color=SURFACE, linewidth=3.2, alpha=0.7)
     axes.plot(*points.T, color=colour, linewidth=1.7)
-    axes.plot(*placed[0], marker="o", markersize=5, color=_SURFACE, markeredgecolor=colour, markeredgewidth=1.6)
-    axes.plot(*placed[-1], marker="s", markersize=5.5, color=colour, markeredgecolor=_SURFACE)
+    axes.plot(*placed[0], marker="o", markersize=5, color=SURFACE, markeredgecolor=colour, markeredgewidth=1.6)
+    axes.plot(*placed[-1], marker="s", markersize=5.5, color=colour, markeredgecolor=SURFACE)
 
 
 def _name_paths(axes: Axes, paths: list[Path], label_size_m: FloatArray) -> None:

@@ -12,7 +12,7 @@ from standoff.core.homography import FloatArray
 from standoff.core.lengths import LengthUnit
 from standoff.core.types import Frame, ImageArray
 from standoff.stages.sinks.blurring import blur
-from standoff.stages.sinks.drawing import Overlay
+from standoff.stages.sinks.overlay import Overlay
 from standoff.stages.sinks.params import DrawParams
 from standoff.stages.sinks.scene import Scene
 from standoff.stages.sinks.sketch import Sketch

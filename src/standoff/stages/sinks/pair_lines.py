@@ -10,7 +10,7 @@ from standoff.core.classes import CLASSES, Role
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.lengths import LengthUnit
 from standoff.core.types import IntArray
-from standoff.stages.sinks.palette import Tone
+from standoff.drawing.palette import Tone
 from standoff.stages.sinks.scene import Scene
 
 _UNMEASURED_WITHIN_SHARE = 0.35  # of the picture's width: beyond, an unknown distance is no news

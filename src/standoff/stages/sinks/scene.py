@@ -23,7 +23,7 @@ from standoff.core.types import (
 )
 from standoff.core.watched_shares import around_tracks, percent_text
 from standoff.core.zones import Zone
-from standoff.stages.sinks.palette import Tone, class_tone
+from standoff.drawing.palette import Tone, class_tone
 
 _WELL_WATCHED = 0.9
 """From this share on nothing is said of the circle about a machine."""

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import GroundMap, ImageArray
 from standoff.core.watched_ground import BEHIND_MACHINE, COLUMNS, ROWS, WATCHED, CellArray
-from standoff.stages.sinks.ground_window import GroundWindow, rectify
+from standoff.drawing.ground_window import GroundWindow, rectify
 
 Opacity = npt.NDArray[np.uint8]
 

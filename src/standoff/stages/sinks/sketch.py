@@ -10,9 +10,9 @@ from standoff.core.homography import FloatArray
 from standoff.core.lengths import METRES, LengthUnit
 from standoff.core.types import GroundMap
 from standoff.core.watched_ground import CellArray
+from standoff.drawing.palette import Tone
 from standoff.stages.sinks.fans import Fan, fans_of
 from standoff.stages.sinks.pair_lines import PairLine, pair_lines
-from standoff.stages.sinks.palette import Tone
 from standoff.stages.sinks.params import DrawParams
 from standoff.stages.sinks.scene import Scene
 

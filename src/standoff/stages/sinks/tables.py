@@ -15,7 +15,7 @@ import numpy as np
 import pyarrow as pa
 
 from standoff import __version__
-from standoff.clips import COLUMNS, FOOT_COLUMNS, metadata_of
+from standoff.clips import COLUMNS, FOOT_COLUMNS, Column, metadata_of, schema_of
 from standoff.core.classes import CLASSES
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import FrameResult, GroundMap, IntArray, NoGroundMap, Outcome, TextArray, WatchedGround
@@ -135,9 +135,8 @@ class TableSink:
         self._parts.close()
 
 
-def _schema(columns: tuple[tuple[str, pa.DataType, str, str], ...]) -> pa.Schema:
-    fields = [pa.field(name, kind, metadata={"unit": unit, "description": text}) for name, kind, unit, text in columns]
-    return pa.schema(fields, metadata={"standoff_version": __version__, "missing_values": "null: not measured"})
+def _schema(columns: tuple[Column, ...]) -> pa.Schema:
+    return schema_of(columns, {"standoff_version": __version__, "missing_values": "null: not measured"})
 
 
 def _frame_columns(result: FrameResult, rows: int) -> dict[str, TextArray]:

@@ -9,14 +9,14 @@ import numpy as np
 from standoff.core.lengths import UNITS
 from standoff.core.types import FrameResult, ImageArray, Outcome
 from standoff.core.zones import Zone
+from standoff.drawing.encoder import VideoFile
+from standoff.drawing.text import TextSprites
 from standoff.stages.sinks.birdseye import BirdsEye
 from standoff.stages.sinks.blurring import PeopleWatch, blur
-from standoff.stages.sinks.drawing import Overlay
-from standoff.stages.sinks.encoder import VideoFile
+from standoff.stages.sinks.overlay import Overlay
 from standoff.stages.sinks.params import ShowParams, VideoParams
 from standoff.stages.sinks.scene import Scene
 from standoff.stages.sinks.sketch import Sketch
-from standoff.stages.sinks.text import TextSprites
 
 
 class Composer:

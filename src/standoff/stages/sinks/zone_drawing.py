@@ -8,9 +8,9 @@ import numpy as np
 
 from standoff.core.homography import FloatArray
 from standoff.core.zones import ring_area, ring_middle
-from standoff.stages.sinks.ground_shapes import clip_to_box
-from standoff.stages.sinks.painter import Painter
-from standoff.stages.sinks.palette import Tone, bgr
+from standoff.drawing.ground_shapes import clip_to_box
+from standoff.drawing.painter import Painter
+from standoff.drawing.palette import Tone, bgr
 from standoff.stages.sinks.scene import Scene
 
 _TINT = 0.14

@@ -7,7 +7,8 @@ import math
 import numpy as np
 
 from standoff.core import protocols
-from standoff.core.boxes import overlaps
+from standoff.core.assignment import assign
+from standoff.core.boxes import overlaps, widen
 from standoff.core.classes import CLASSES
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.picture_step import picture_step
@@ -16,7 +17,6 @@ from standoff.core.roles import REFERENCE_ROLE, ROLE_OF_CLASS
 from standoff.core.types import CameraMotion, Detections, IntArray, NoCameraMotion, Tracks
 from standoff.stages.track import foot, reach
 from standoff.stages.track import motion as box_motion
-from standoff.stages.track.association import assign, widen
 from standoff.stages.track.carry import carry
 from standoff.stages.track.params import TrackParams
 

@@ -11,8 +11,9 @@ from pathlib import Path
 
 from standoff.core.classes import names_by_line
 from standoff.core.errors import ModelError
+from standoff.files.fingerprint import file_sha256
 from standoff.files.whole import whole_file
-from standoff.stages.detect.model_card import INPUT_NAME, OUTPUT_NAME, POINTS_NAME, ModelCard, file_sha256
+from standoff.stages.detect import BOXES_OUTPUT, PICTURE_INPUT, POINTS_OUTPUT, ModelCard
 from standoff.training.darknet.cfg import DarknetCfg, read_cfg
 from standoff.training.darknet.sections import read_names_text
 from standoff.training.darknet.shapes import check_input
@@ -104,8 +105,8 @@ def _write_onnx(cfg: DarknetCfg, weights: Path, card: ModelCard, path: Path) -> 
             str(path),
             dynamo=False,
             opset_version=OPSET,
-            input_names=[INPUT_NAME],
-            output_names=[OUTPUT_NAME, POINTS_NAME] if has_point else [OUTPUT_NAME],
+            input_names=[PICTURE_INPUT],
+            output_names=[BOXES_OUTPUT, POINTS_OUTPUT] if has_point else [BOXES_OUTPUT],
         )
     model = onnx.load(str(path))
     onnx.helper.set_model_props(model, card.to_metadata())

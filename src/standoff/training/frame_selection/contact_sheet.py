@@ -10,9 +10,9 @@ import numpy as np
 
 from standoff.core.homography import FloatArray
 from standoff.core.types import Detections, Frame, ImageArray, IntArray
-from standoff.stages.sinks.painter import Painter
-from standoff.stages.sinks.palette import bgr, class_tone
-from standoff.stages.sinks.text import TextSprites, write_light
+from standoff.drawing.painter import Painter
+from standoff.drawing.palette import bgr, class_tone
+from standoff.drawing.text import TextSprites, write_light
 
 _TILE_WIDTH_PX = 384
 _FONT_PX = 13

@@ -12,7 +12,7 @@ import numpy as np
 from standoff.core.homography import FloatArray
 from standoff.core.types import ImageArray, IntArray
 from standoff.labels import LabelledPicture, load_picture
-from standoff.stages.detect.point_crops import AROUND, CROP_PX, POINT_CLASSES, crop, squares_px
+from standoff.stages.detect import POINT_CLASSES, POINT_CROP_AROUND, POINT_CROP_PX, point_crop, point_squares_px
 from standoff.training.pictures.augment_params import AugmentParams
 from standoff.training.pictures.degrade import degrade
 
@@ -58,15 +58,15 @@ def read_patches(
     images, points, class_index, heights = [], [], [], []
     for picture in pictures:
         sides_px = picture.xyxy_px[:, 2:] - picture.xyxy_px[:, :2]
-        squares = squares_px(picture.xyxy_px, AROUND * PATCH_PX / CROP_PX)
+        squares = point_squares_px(picture.xyxy_px, POINT_CROP_AROUND * PATCH_PX / POINT_CROP_PX)
         inside = (picture.foot_px + 0.5 - squares[:, :2]) / squares[:, 2:]
         usable = ~picture.ignored & (of_class[picture.class_id] >= 0) & (sides_px[:, 1] >= _LEAST_BOX_PX)
-        usable &= np.abs(np.nan_to_num(inside, nan=9.0) - 0.5).max(axis=1) * PATCH_PX / CROP_PX < _FARTHEST_SIDES
+        usable &= np.abs(np.nan_to_num(inside, nan=9.0) - 0.5).max(axis=1) * PATCH_PX / POINT_CROP_PX < _FARTHEST_SIDES
         rows = np.flatnonzero(usable)
         image = load_picture(picture) if len(rows) else None
         for row in rows.tolist():
             assert image is not None
-            images.append(crop(image, squares[row], PATCH_PX))
+            images.append(point_crop(image, squares[row], PATCH_PX))
             points.append(inside[row])
             class_index.append(of_class[picture.class_id[row]])
             heights.append(sides_px[row, 1])
@@ -82,8 +82,8 @@ def read_patches(
 
 def middle_crop(patch: ImageArray, point: FloatArray) -> tuple[ImageArray, FloatArray]:
     """Return what the network sees of a patch where the box is right, and the point in it."""
-    edge = (PATCH_PX - CROP_PX) // 2
-    return patch[edge : edge + CROP_PX, edge : edge + CROP_PX], (point * PATCH_PX - edge) / CROP_PX
+    edge = (PATCH_PX - POINT_CROP_PX) // 2
+    return patch[edge : edge + POINT_CROP_PX, edge : edge + POINT_CROP_PX], (point * PATCH_PX - edge) / POINT_CROP_PX
 
 
 def drawn_crop(
@@ -101,18 +101,22 @@ def drawn_crop(
     turn = np.radians(rng.normal(0.0, 4.0))
     mirror = -1.0 if rng.random() < 0.5 else 1.0
     linear = zoom * np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]]) @ np.diag([mirror, 1.0])
-    middle, to = np.full(2, PATCH_PX / 2.0), np.full(2, CROP_PX / 2.0) + rng.normal(0.0, 0.035 * CROP_PX, 2)
+    middle, to = np.full(2, PATCH_PX / 2.0), np.full(2, POINT_CROP_PX / 2.0) + rng.normal(0.0, 0.035 * POINT_CROP_PX, 2)
     shift = to - linear @ middle
     # OpenCV counts pixels from the centre of the first, the point from its edge.
     matrix = np.column_stack([linear, shift + linear @ np.full(2, 0.5) - 0.5])
-    seen = cv2.warpAffine(patch, matrix, (CROP_PX, CROP_PX), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    seen = cv2.warpAffine(
+        patch, matrix, (POINT_CROP_PX, POINT_CROP_PX), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+    )
     if rng.random() < 0.25:
-        small = int(rng.integers(12, CROP_PX // 2))
-        seen = cv2.resize(cv2.resize(seen, (small, small), interpolation=cv2.INTER_AREA), (CROP_PX, CROP_PX))
+        small = int(rng.integers(12, POINT_CROP_PX // 2))
+        seen = cv2.resize(
+            cv2.resize(seen, (small, small), interpolation=cv2.INTER_AREA), (POINT_CROP_PX, POINT_CROP_PX)
+        )
     if rng.random() < 0.3:
         # Something stands before it.
-        width, height = rng.integers(8, CROP_PX // 2, 2)
-        left, top = rng.integers(-8, CROP_PX - 8, 2)
+        width, height = rng.integers(8, POINT_CROP_PX // 2, 2)
+        left, top = rng.integers(-8, POINT_CROP_PX - 8, 2)
         seen = seen.copy()
         seen[max(top, 0) : top + height, max(left, 0) : left + width] = rng.integers(0, 256, 3)
-    return degrade(rng, np.ascontiguousarray(seen), params), (linear @ (point * PATCH_PX) + shift) / CROP_PX
+    return degrade(rng, np.ascontiguousarray(seen), params), (linear @ (point * PATCH_PX) + shift) / POINT_CROP_PX

@@ -11,7 +11,7 @@ from typing import Final
 import torch
 from torch import Tensor, nn
 
-from standoff.stages.detect.point_crops import CROP_PX, POINT_CLASSES
+from standoff.stages.detect import POINT_CLASSES, POINT_CROP_PX
 
 LOG_SIGMA: Final = (-5.0, 1.0)
 """Least and largest logarithm of a stated standard error, in sides of the crop."""
@@ -22,8 +22,8 @@ _REACH: Final = 1.5
 class GroundPointNetwork(nn.Module):
     """From crops to ground points of every class.
 
-    Crops are (N, 3, CROP_PX, CROP_PX), red first, 0 to 1; the result is (N, C, 4): x and y from 0 to 1 across and down
-    the crop, perhaps beyond, and the logarithms of their standard errors.
+    Crops are (N, 3, S, S) with S = `POINT_CROP_PX`, red first, 0 to 1; the result is (N, C, 4): x and y from 0 to 1
+    across and down the crop, perhaps beyond, and the logarithms of their standard errors.
     """
 
     def __init__(self) -> None:
@@ -38,7 +38,7 @@ class GroundPointNetwork(nn.Module):
         self.sigma = nn.Sequential(nn.Linear(96 + 64, 64), nn.ReLU(), nn.Linear(64, 2 * count))
         self.nudge = nn.Linear(96, 2 * count)
         nn.init.zeros_(self.nudge.weight)
-        cells = CROP_PX // 8
+        cells = POINT_CROP_PX // 8
         places = (torch.arange(cells) + 0.5) / cells
         self.places: Tensor
         self.register_buffer("places", (places - 0.5) * _REACH + 0.5)

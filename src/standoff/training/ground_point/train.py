@@ -21,14 +21,14 @@ from standoff.core.errors import DataError
 from standoff.core.homography import FloatArray
 from standoff.core.types import IntArray
 from standoff.files.whole import whole_file
-from standoff.stages.detect.point_crops import AROUND, CROP_PX, POINT_CLASSES
-from standoff.stages.detect.point_network import (
+from standoff.stages.detect import (
     CLASS_INPUT,
     CROPS_INPUT,
-    FORMAT,
-    FORMAT_KEY,
+    POINT_CLASSES,
+    POINT_CROP_AROUND,
+    POINT_CROP_PX,
     POINTS_OUTPUT,
-    TELLS_KEY,
+    point_metadata,
 )
 from standoff.training.darknet.export import OPSET
 from standoff.training.ground_point.crops import PATCH_PX, Patches, drawn_crop, middle_crop
@@ -166,7 +166,7 @@ def _running_mean(left: float) -> Callable[[Tensor, Tensor, Tensor | int], Tenso
 
 def _usual_points(patches: Patches) -> Tensor:
     """Return (C, 2) where things of each class stand in the middle, in crops."""
-    crops = (patches.point * PATCH_PX - (PATCH_PX - CROP_PX) / 2.0) / CROP_PX
+    crops = (patches.point * PATCH_PX - (PATCH_PX - POINT_CROP_PX) / 2.0) / POINT_CROP_PX
     usual = [
         np.median(crops[patches.class_index == k], axis=0) if (patches.class_index == k).any() else np.full(2, 0.5)
         for k in range(len(POINT_CLASSES))
@@ -190,7 +190,7 @@ def measure_points(network: GroundPointNetwork, patches: Patches) -> list[PointE
     """Say how far off the network is on crops that it did not learn from, class by class."""
     told = _all_told(network, patches)
     true = np.array([middle_crop(*one)[1] for one in zip(patches.images, patches.point, strict=True)]).reshape(-1, 2)
-    off = AROUND * np.linalg.norm(told[:, :2] - true, axis=1)
+    off = POINT_CROP_AROUND * np.linalg.norm(told[:, :2] - true, axis=1)
     sigmas = np.linalg.norm((told[:, :2] - true) / np.exp(told[:, 2:]), axis=1)
     return [
         _error(name, off[patches.class_index == k], sigmas[patches.class_index == k])
@@ -238,7 +238,7 @@ def write_points(
         OutputError: The file cannot be written.
     """
     stretch = torch.tensor([[one.stretch] * 2 for one in errors], dtype=torch.float32)
-    example = torch.zeros(2, 3, CROP_PX, CROP_PX), torch.zeros(2, dtype=torch.int64)
+    example = torch.zeros(2, 3, POINT_CROP_PX, POINT_CROP_PX), torch.zeros(2, dtype=torch.int64)
     with whole_file(out) as path:
         with torch.no_grad(), warnings.catch_warnings():
             # The TorchScript exporter is chosen on purpose: the other one needs onnxscript.
@@ -254,6 +254,7 @@ def write_points(
                 dynamic_axes={name: {0: "count"} for name in (CROPS_INPUT, CLASS_INPUT, POINTS_OUTPUT)},
             )
         model = onnx.load(str(path))
-        texts = {FORMAT_KEY: FORMAT, "classes": json.dumps(POINT_CLASSES), TELLS_KEY: json.dumps(list(tells))}
-        onnx.helper.set_model_props(model, texts | {key: json.dumps(value) for key, value in facts.items()})
+        onnx.helper.set_model_props(
+            model, point_metadata(tells) | {key: json.dumps(value) for key, value in facts.items()}
+        )
         onnx.save(model, str(path))

@@ -7,8 +7,8 @@ from typing import Annotated, Final, Self, get_args
 from annotated_types import Ge, Gt, Interval
 from typing_extensions import Doc
 
+from standoff.core.class_map import map_classes
 from standoff.core.errors import ModelError
-from standoff.stages.detect.class_map import map_classes
 
 Chance = Annotated[float, Interval(ge=0, le=1)]
 Range = tuple[float, float]

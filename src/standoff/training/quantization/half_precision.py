@@ -16,8 +16,7 @@ import onnxruntime
 
 from standoff.core.errors import ModelError
 from standoff.files.whole import whole_file
-from standoff.stages.detect.model_card import INPUT_NAME, OUTPUT_NAME, ModelCard
-from standoff.stages.detect.runtime import open_session
+from standoff.stages.detect import BOXES_OUTPUT, PICTURE_INPUT, ModelCard, open_session
 from standoff.training.quantization.onnx_file import read_own_model
 
 _WEIGHTED = frozenset({"Conv", "ConvTranspose", "Gemm", "MatMul"})
@@ -99,7 +98,7 @@ def largest_shifts(model_a: Path, model_b: Path, card: ModelCard) -> tuple[float
 
 
 def _shifts(sessions: list[onnxruntime.InferenceSession], picture: _Floats) -> tuple[float, float]:
-    rows_a, rows_b = (session.run([OUTPUT_NAME], {INPUT_NAME: picture})[0][0] for session in sessions)
+    rows_a, rows_b = (session.run([BOXES_OUTPUT], {PICTURE_INPUT: picture})[0][0] for session in sessions)
     height, width = picture.shape[2:]
     boxes = np.abs(rows_a[:, :4] - rows_b[:, :4]) / np.array([width, height, width, height])
     scores_a, scores_b = (rows[:, 4:5] * rows[:, 5:] for rows in (rows_a, rows_b))

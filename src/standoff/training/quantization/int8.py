@@ -30,8 +30,7 @@ from onnxruntime.quantization.qdq_quantizer import QDQQuantizer
 from onnxruntime.quantization.shape_inference import quant_pre_process
 
 from standoff.core.homography import FloatArray
-from standoff.stages.detect.model_card import INPUT_NAME, OUTPUT_NAME
-from standoff.stages.detect.runtime import open_session
+from standoff.stages.detect import BOXES_OUTPUT, PICTURE_INPUT, open_session
 
 Method = Literal["minmax", "entropy", "percentile"]
 NetworkInput = npt.NDArray[np.float32]
@@ -180,7 +179,7 @@ class Int8Network:
     @staticmethod
     def _outputs(path: Path, inputs: Sequence[NetworkInput]) -> FloatArray:
         session = open_session(path, "cpu", 0)
-        rows = [session.run([OUTPUT_NAME], {INPUT_NAME: picture})[0][0] for picture in inputs]
+        rows = [session.run([BOXES_OUTPUT], {PICTURE_INPUT: picture})[0][0] for picture in inputs]
         return np.concatenate(rows).astype(np.float64)
 
 
@@ -195,7 +194,7 @@ def _harm(expected: FloatArray, found: FloatArray) -> float:
 
 class _OnePicture(CalibrationDataReader):  # type: ignore[misc] # onnxruntime has no types
     def __init__(self, picture: NetworkInput) -> None:
-        self._feeds = iter([{INPUT_NAME: picture}])
+        self._feeds = iter([{PICTURE_INPUT: picture}])
 
     def get_next(self) -> dict[str, NetworkInput] | None:
         return next(self._feeds, None)

@@ -10,9 +10,9 @@ import onnx
 
 from standoff.core.errors import DataError
 from standoff.core.finding import WorkerFinding
+from standoff.files.fingerprint import file_sha256
 from standoff.files.whole import whole_file
-from standoff.stages.detect.model_card import ModelCard, file_sha256
-from standoff.stages.detect.runtime import open_session
+from standoff.stages.detect import ModelCard, open_session
 
 _QUANTIZED = frozenset({"QuantizeLinear", "DequantizeLinear", "QLinearConv", "ConvInteger"})
 

@@ -19,7 +19,7 @@ from standoff.files.whole import whole_file
 from standoff.labels import LabelledData, LabelledPicture, Split, load_picture
 from standoff.labels.problems import readable_pictures
 from standoff.labels.splits import spread
-from standoff.stages.detect.letterbox import Letterbox
+from standoff.stages.detect import Letterbox
 from standoff.stages.frames import frame_from_array
 from standoff.training.quantization.gate import Gate, Loss
 from standoff.training.quantization.int8 import Int8Network, Method, NetworkInput, Recipe

@@ -12,9 +12,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from standoff.core.types import Detections, ImageArray
-from standoff.evaluation.detection.style import GRID, INK, SERIES_COLOURS
+from standoff.drawing.file_charts import GRID, INK, SERIES_COLOURS
 from standoff.labels import LabelledPicture, load_picture
-from standoff.stages.detect.letterbox import resize
+from standoff.stages.detect import resize
 
 _LOSSES: Final = {
     "loss_total": "total",

@@ -10,10 +10,10 @@ from typing import Any, Final
 
 from standoff.core.errors import ConfigError, ModelError
 from standoff.evaluation.detection import DetectionScore
+from standoff.files.fingerprint import file_sha256
 from standoff.files.in_use import FolderInUse
 from standoff.labels import LabelledData, Problem
 from standoff.labels.summary import summarise
-from standoff.stages.detect.model_card import file_sha256
 from standoff.training.darknet.cfg import parse_cfg, read_cfg
 from standoff.training.darknet.network import DarknetNetwork
 from standoff.training.darknet.shapes import check_input

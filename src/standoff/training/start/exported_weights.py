@@ -20,7 +20,7 @@ import torch
 from torch import nn
 
 from standoff.core.errors import ModelError
-from standoff.stages.detect.model_card import POINTS_NAME, ModelCard
+from standoff.stages.detect import POINTS_OUTPUT, ModelCard
 from standoff.training.darknet.cfg import Convolutional, DarknetCfg, Yolo
 from standoff.training.darknet.network import ConvolutionBlock, DarknetNetwork
 from standoff.training.quantization.onnx_file import is_quantized, read_own_model
@@ -33,7 +33,7 @@ _Kernel = tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]
 def gives_points(path: Path) -> bool:
     """Tell whether an exported detector gives ground points."""
     model, _ = read_own_model(path)
-    return any(output.name == POINTS_NAME for output in model.graph.output)
+    return any(output.name == POINTS_OUTPUT for output in model.graph.output)
 
 
 def read_exported(cfg: DarknetCfg, path: Path) -> tuple[DarknetNetwork, tuple[str, ...]]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from standoff.evaluation.detection.style import SERIES_COLOURS, blank, colour_of, tidy
+from standoff.drawing.file_charts import SERIES_COLOURS, blank, colour_of, tidy
 from standoff.training.sweep.results import Result
 
 _DASHES: Final = ("-", "--", ":", "-.")

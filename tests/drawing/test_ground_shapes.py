@@ -15,7 +15,7 @@ from standoff.core import homography
 from standoff.core.camera import Camera
 from standoff.core.homography import FloatArray
 from standoff.core.types import GroundMap
-from standoff.stages.sinks.ground_shapes import circle_outlines_px, clip_in_front
+from standoff.drawing.ground_shapes import circle_outlines_px, clip_in_front
 
 LENS = Camera(1280, 720, np.array([[900.0, 0, 640], [0, 900, 360], [0, 0, 1]]), np.array([-0.28, 0.08, 0, 0, 0]))
 GROUNDS = (FakeSite((1280, 720)).ground(), FakeSite((1280, 720), camera=LENS).ground())

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from standoff.core import homography
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import GroundMap, ImageArray
-from standoff.stages.sinks.ground_shapes import clip_in_front
+from standoff.drawing.ground_shapes import clip_in_front
 
 _GRID = 24
 _LENS_STEP_PX = 16

@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from standoff.core.homography import FloatArray
 from standoff.core.types import ImageArray
-from standoff.stages.sinks.palette import Bgr, bgr
-from standoff.stages.sinks.text import TextSprites, write_light
+from standoff.drawing.palette import Bgr, bgr
+from standoff.drawing.text import TextSprites, write_light
 
 _SHIFT = 4
 _FAR_PX = 1e6

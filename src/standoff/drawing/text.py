@@ -9,7 +9,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from standoff.core.types import ImageArray
-from standoff.stages.sinks.palette import bgr
+from standoff.drawing.palette import bgr
 
 _KEPT = 1024
 

@@ -1,4 +1,4 @@
-"""Tell whether two sources hold the same pictures without reading all of them."""
+"""Digests by which files are known again: of all of a file, or of a source of pictures without reading all of it."""
 
 from __future__ import annotations
 
@@ -26,3 +26,9 @@ def fingerprint(files: Sequence[Path]) -> str:
         last.seek(max(0, files[-1].stat().st_size - _PART_BYTES))
         digest.update(last.read(_PART_BYTES))
     return digest.hexdigest()
+
+
+def file_sha256(path: Path) -> str:
+    """Return the SHA-256 of a file's content, in hexadecimal."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

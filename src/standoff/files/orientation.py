@@ -6,16 +6,13 @@ import struct
 from dataclasses import dataclass
 from typing import Any, Final, Self
 
-import av
 import cv2
 import numpy as np
-from av.sidedata.sidedata import Type
 
 from standoff.core.types import ImageArray
 
 _CROOKED: Final = 0.01
 """Of a side of the picture; a display matrix that is further from the eight ways is none of them."""
-_KINDS_PYAV_MAY_NOT_KNOW: Final = range(28, 36)  # of libavutil/frame.h, AV_FRAME_DATA_LCEVC and on
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,29 +109,3 @@ class Orientation:
 
 
 UPRIGHT: Final = Orientation()
-
-
-def display_orientation(frame: av.VideoFrame) -> Orientation:
-    """Return how a decoded frame is to be shown.
-
-    Raises:
-        ValueError: It is none of the eight ways; says what.
-    """
-    try:
-        side_data = frame.side_data
-    except ValueError:  # data of a kind that PyAV does not know, beside which it can read nothing else
-        side_data = _with_known_data_only(frame).side_data
-    matrix = side_data.get(Type.DISPLAYMATRIX)
-    return Orientation() if matrix is None else Orientation.of_display_matrix(bytes(matrix))
-
-
-def _with_known_data_only(frame: av.VideoFrame) -> av.VideoFrame:
-    graph = av.filter.Graph()
-    nodes = [
-        graph.add_buffer(width=frame.width, height=frame.height, format=frame.format.name, time_base=frame.time_base),
-        *(graph.add("sidedata", f"mode=delete:type={kind}") for kind in _KINDS_PYAV_MAY_NOT_KNOW),
-        graph.add("buffersink"),
-    ]
-    graph.link_nodes(*nodes).configure()
-    graph.push(frame)
-    return graph.pull()

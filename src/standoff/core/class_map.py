@@ -8,7 +8,6 @@ from typing import Final
 
 from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.errors import ModelError
-from standoff.stages.detect.params import IGNORE
 
 _SYNONYMS: Final = {
     "worker": ("person", "pedestrian", "people", "human"),
@@ -20,6 +19,8 @@ _SYNONYMS: Final = {
 }
 
 _LABELS_NAMED: Final = 12
+IGNORE: Final = "ignore"
+"""In place of a class of the site: nothing is made of this label."""
 
 DEFAULT_CLASS_MAP: Final[Mapping[str, str]] = MappingProxyType(
     {name: name for name in CLASS_BY_NAME}

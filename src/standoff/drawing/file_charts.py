@@ -1,4 +1,4 @@
-"""How pictures of detectors' accuracy look."""
+"""Charts for picture files: figures on white, in quiet colours."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ import yaml
 
 from standoff.core.homography import FloatArray
 
-sys.path.insert(0, str(Path(__file__).parents[3] / "examples" / "drawn_site"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "examples" / "drawn_site"))
 import draw_site
 
 FRAMES = 36
@@ -182,3 +182,9 @@ def _frame_row(frame: int) -> dict[str, Any]:
         "board_y_px": np.zeros(0).tolist(),
         **_camera_of(frame),
     }
+
+
+def change_scene(folder: Path, **changes: object) -> None:
+    """Write other values into what a clip says of itself."""
+    path = folder / "scene.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | changes))

@@ -7,15 +7,15 @@ import numpy as np
 from standoff.core.homography import FloatArray
 from standoff.core.types import GroundMap, ImageArray
 from standoff.core.zones import NOT_PLACED
+from standoff.drawing.ground_shapes import circle_outlines_px, outlines_in_sight_px
+from standoff.drawing.painter import Painter
+from standoff.drawing.palette import Tone, bgr
+from standoff.drawing.text import TextSprites
 from standoff.stages.sinks.fans import FAN_OPACITY
-from standoff.stages.sinks.ground_shapes import circle_outlines_px, outlines_in_sight_px
-from standoff.stages.sinks.painter import Painter
-from standoff.stages.sinks.palette import Tone, bgr
 from standoff.stages.sinks.params import DrawParams
 from standoff.stages.sinks.scene import ASSISTANCE
 from standoff.stages.sinks.shade import PictureShade
 from standoff.stages.sinks.sketch import Sketch
-from standoff.stages.sinks.text import TextSprites
 from standoff.stages.sinks.zone_drawing import ZoneDrawing
 
 _LEGEND: tuple[tuple[Tone, str], ...] = (

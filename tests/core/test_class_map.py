@@ -2,10 +2,9 @@ from __future__ import annotations
 
 import pytest
 
+from standoff.core.class_map import DEFAULT_CLASS_MAP, map_classes
 from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.errors import ModelError
-from standoff.stages.detect import DEFAULT_CLASS_MAP, DetectParams
-from standoff.stages.detect.class_map import map_classes
 
 
 def test_every_class_of_the_site_is_its_own_label() -> None:
@@ -34,17 +33,3 @@ def test_an_override_of_no_label_is_refused() -> None:
 def test_a_model_without_any_class_of_the_site_is_refused_with_its_labels() -> None:
     with pytest.raises(ModelError, match="found kite, sheep"):
         map_classes(("kite", "sheep"), {}, "m.onnx")
-
-
-@pytest.mark.parametrize(
-    ("settings", "message"),
-    [
-        ({"class_map": {"person": "wroker"}}, "class_map sends 'person' to 'wroker'"),
-        ({"class_score_thresholds": {"person": 0.3}}, "class_score_thresholds names 'person'"),
-        ({"class_score_thresholds": {"worker": 1.3}}, "must lie between 0 and 1, not 1.3"),
-        ({"slices": (0, 2)}, r"slices must be at least \(1, 1\)"),
-    ],
-)
-def test_settings_that_contradict_are_refused(settings: dict[str, dict[str, str]], message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        DetectParams(**settings)  # type: ignore[arg-type]

@@ -13,7 +13,7 @@ from typing import BinaryIO, Final
 from PIL import ExifTags, Image, UnidentifiedImageError
 
 from standoff.files.lfs import FETCH, POINTER, is_pointer
-from standoff.stages.frames.orientation import Orientation
+from standoff.files.orientation import Orientation
 
 _JPEG_START, _JPEG_SCAN, _JPEG_END = b"\xff\xd8", b"\xff\xda", b"\xff\xd9"
 _PNG_HEAD_BYTES: Final = 8

@@ -9,17 +9,38 @@ from typing import Any
 
 import numpy as np
 
+from standoff.clips.clip_folder import (
+    CAMERA_FILE,
+    CLIP_FORMAT,
+    CLIP_FRAMES_FILE,
+    PAIRS_FILE,
+    REFERENCE_FILE,
+    RENDER_AGAIN,
+    SCENE_FILE,
+    TRUTH_FILE,
+    VIDEO_FILE,
+    read_clip_table,
+)
+from standoff.clips.columns import Columns
 from standoff.core.classes import CLASSES, Role
 from standoff.core.errors import DataError
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import IntArray
-from standoff.evaluation.paper.clip_tables import FRAMES, PAIRS, REFERENCE_PX, TRUTH, read_table
-from standoff.evaluation.positions_input import Columns
 from standoff.files.json_text import read_json
 
-FORMAT = 1
-SCENE = "scene.json"
-_FIX = "render the clip again with `standoff simulate`"
+_TRUTH = ("frame", "entity_id", "class_id", "x_m", "y_m", "x1_px", "y1_px", "x2_px", "y2_px", "foot_x_px", "foot_y_px")
+_PAIRS = ("frame", "entity_a", "entity_b", "centre_m")
+_REFERENCE_PX = ("reference_top_x_px", "reference_top_y_px")
+_CAMERA = ("camera_x_m", "camera_y_m", "camera_z_m", "site_to_camera")
+_FRAMES = (
+    "frame",
+    "reference_covered",
+    "reference_visible_share",
+    *_REFERENCE_PX,
+    "board_x_px",
+    "board_y_px",
+    *_CAMERA,
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,6 +62,12 @@ class TrueReference:
     corners_px: FloatArray
     visible_share: FloatArray
     covered: BoolArray
+
+    def inside(self, size_px: tuple[int, int]) -> BoolArray:
+        """Return (F,) whether all four corners are in the picture; what lies on them does not matter."""
+        # A corner that no lens sees is NaN, and NaN is not inside.
+        in_picture = (self.corners_px >= -0.5) & (self.corners_px <= np.array(size_px) - 0.5)
+        return np.asarray(in_picture.all(axis=(1, 2)), dtype=np.bool_)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -106,7 +133,17 @@ class Clip:
     @property
     def video(self) -> Path:
         """The video's file."""
-        return self.folder / "video.mp4"
+        return self.folder / VIDEO_FILE
+
+    @property
+    def camera_file(self) -> Path:
+        """The file of the camera's matrix and distortion."""
+        return self.folder / CAMERA_FILE
+
+    @property
+    def settings_file(self) -> Path:
+        """The settings that describe the reference object and the camera."""
+        return self.folder / REFERENCE_FILE
 
     def names(self) -> list[str]:
         """Return (E,) the classes, numbered where there are several of one."""
@@ -128,20 +165,24 @@ def load_clip(folder: Path | str) -> Clip:
     """
     folder = Path(folder)
     scene = read_scene(folder)
-    for name in ("video.mp4", "camera.yaml", "reference.yaml"):
+    for name in (VIDEO_FILE, CAMERA_FILE, REFERENCE_FILE):
         if not (folder / name).is_file():
-            raise DataError(expected=f"{name} in the clip", found=f"no {folder / name}", fix=_FIX)
+            raise DataError(expected=f"{name} in the clip", found=f"no {folder / name}", fix=RENDER_AGAIN)
     truth, pairs, frames = (
-        read_table(folder / f"{name}.parquet", columns)
-        for name, columns in (("truth", TRUTH), ("pairs", PAIRS), ("frames", FRAMES))
+        read_clip_table(folder, name, columns)
+        for name, columns in ((TRUTH_FILE, _TRUTH), (PAIRS_FILE, _PAIRS), (CLIP_FRAMES_FILE, _FRAMES))
     )
     count = len(frames["frame"])
     if count == 0 or (frames["frame"] != np.arange(count)).any():
-        raise DataError(expected="frames from 0 on in frames.parquet", found=f"others in {folder}", fix=_FIX)
-    for name, table in (("truth", truth), ("pairs", pairs)):
+        raise DataError(
+            expected=f"frames from 0 on in {CLIP_FRAMES_FILE}", found=f"others in {folder}", fix=RENDER_AGAIN
+        )
+    for name, table in ((TRUTH_FILE, truth), (PAIRS_FILE, pairs)):
         if len(table["frame"]) and not 0 <= table["frame"].min() <= table["frame"].max() < count:
-            found = f"others in {folder / name}.parquet"
-            raise DataError(expected=f"frames from 0 to {count - 1} as in frames.parquet", found=found, fix=_FIX)
+            found = f"others in {folder / name}"
+            raise DataError(
+                expected=f"frames from 0 to {count - 1} as in {CLIP_FRAMES_FILE}", found=found, fix=RENDER_AGAIN
+            )
     board = _board(scene, frames, folder)
     # A checkerboard is measured by its own corners; its outline is none of the paper's reference objects.
     reference = None if board is not None else _reference(scene, frames, folder)
@@ -154,30 +195,25 @@ def load_clip(folder: Path | str) -> Clip:
     return _assemble(folder, scene, truth, pairs, frames, reference, board)
 
 
-def inside(reference: TrueReference, size_px: tuple[int, int]) -> BoolArray:
-    """Return (F,) whether all four corners are in the picture; what lies on them does not matter."""
-    # A corner that no lens sees is NaN, and NaN is not inside.
-    in_picture = (reference.corners_px >= -0.5) & (reference.corners_px <= np.array(size_px) - 0.5)
-    return np.asarray(in_picture.all(axis=(1, 2)), dtype=np.bool_)
-
-
 def read_scene(folder: Path) -> Mapping[str, Any]:
     """Read what a clip shows.
 
     Raises:
         DataError: There is no such file, or it is not what it should be.
     """
-    path = folder / SCENE
+    path = folder / SCENE_FILE
     if not path.is_file():
         fix = "give the folder that `standoff simulate` wrote"
         raise DataError(expected="a clip folder", found=f"no {path}", fix=fix)
     scene = read_json(path, "what a clip shows")
     found = scene.get("format") if isinstance(scene, dict) else None
-    if found != FORMAT:
-        raise DataError(expected=f"a clip of format {FORMAT}", found=f"format {found} in {path}", fix=_FIX)
+    if found != CLIP_FORMAT:
+        raise DataError(expected=f"a clip of format {CLIP_FORMAT}", found=f"format {found} in {path}", fix=RENDER_AGAIN)
     missing = [name for name in ("preset", "seed", "entities", "reference", "board") if name not in scene]
     if missing:
-        raise DataError(expected=f"a whole {SCENE}", found=f"{path} without {', '.join(missing)}", fix=_FIX)
+        raise DataError(
+            expected=f"a whole {SCENE_FILE}", found=f"{path} without {', '.join(missing)}", fix=RENDER_AGAIN
+        )
     return dict(scene)
 
 
@@ -185,7 +221,7 @@ def _reference(scene: Mapping[str, Any], frames: Columns, folder: Path) -> TrueR
     entry = scene["reference"]
     if entry is None:
         return None
-    corners_px = np.stack([_lists(frames[name], 4, folder, "corners") for name in REFERENCE_PX], axis=-1)
+    corners_px = np.stack([_lists(frames[name], 4, folder, "corners") for name in _REFERENCE_PX], axis=-1)
     base_m = np.array(entry["base_m"], dtype=np.float64)
     return TrueReference(
         entity_id=int(entry["entity_id"]),
@@ -205,8 +241,8 @@ def _board(scene: Mapping[str, Any], frames: Columns, folder: Path) -> TrueBoard
     corners = len(entry["corners_m"])
     side = round(corners**0.5)
     if side * side != corners or side < 3:
-        found = f"{corners} in {folder / SCENE}"
-        raise DataError(expected="a square board of at least 3x3 inner corners", found=found, fix=_FIX)
+        found = f"{corners} in {folder / SCENE_FILE}"
+        raise DataError(expected="a square board of at least 3x3 inner corners", found=found, fix=RENDER_AGAIN)
     corners_px = np.stack([_lists(frames[f"board_{axis}_px"], corners, folder, "corners") for axis in "xy"], axis=-1)
     return TrueBoard(side, float(entry["square_m"]), corners_px.reshape(-1, side, side, 2))
 
@@ -215,8 +251,8 @@ def _lists(column: Any, length: int, folder: Path, what: str) -> FloatArray:  # 
     """Return (F, length) of a column of lists."""
     rows = [np.asarray(row, dtype=np.float64) for row in column]
     if any(len(row) != length for row in rows):
-        found = f"another number in frames.parquet of {folder}"
-        raise DataError(expected=f"{length} {what} in every frame", found=found, fix=_FIX)
+        found = f"another number in {CLIP_FRAMES_FILE} of {folder}"
+        raise DataError(expected=f"{length} {what} in every frame", found=found, fix=RENDER_AGAIN)
     return np.stack(rows)
 
 
@@ -242,7 +278,9 @@ def _assemble(
     if reference is not None:
         of_reference = np.flatnonzero(entity_ids == reference.entity_id)
         if len(of_reference) != 1:
-            raise DataError(expected="the reference object in truth.parquet", found=f"none in {folder}", fix=_FIX)
+            raise DataError(
+                expected=f"the reference object in {TRUTH_FILE}", found=f"none in {folder}", fix=RENDER_AGAIN
+            )
         reference_box = everything[:, of_reference[0], :4]
     which, distance_m = _distances(pairs, entity_ids[own], class_id[own], count)
     return Clip(
@@ -271,7 +309,9 @@ def _distances(pairs: Columns, entity_id: IntArray, class_id: IntArray, count: i
     which = np.array([(a, b) for a in np.flatnonzero(person) for b in np.flatnonzero(~person)], dtype=np.int64)
     which = which.reshape(-1, 2)
     if not np.isin([pairs["entity_a"], pairs["entity_b"]], entity_id).all():
-        raise DataError(expected="pairs of entities of truth.parquet", found="others in pairs.parquet", fix=_FIX)
+        raise DataError(
+            expected="pairs of entities of truth.parquet", found="others in pairs.parquet", fix=RENDER_AGAIN
+        )
     square = np.full((count, len(entity_id), len(entity_id)), np.nan)
     first, second = (np.searchsorted(entity_id, pairs[name]) for name in ("entity_a", "entity_b"))
     square[pairs["frame"], first, second] = square[pairs["frame"], second, first] = pairs["centre_m"]
