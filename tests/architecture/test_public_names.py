@@ -61,7 +61,7 @@ PUBLIC_NAMES = {
         "point_metadata", "point_squares_px", "resize",
     },
     "standoff.stages.frames": {
-        "ArrayPicture", "AvPicture", "Scaler", "Source", "SourceParams", "frame_from_array", "local_path",
+        "ArrayPicture", "AvPicture", "FileSource", "Scaler", "SourceParams", "frame_from_array", "local_path",
         "open_source",
     },
     "standoff.stages.ground": {

@@ -21,7 +21,7 @@ DROP: Final = "drop"
 
 
 @dataclass(frozen=True, slots=True)
-class Source:
+class LabelSource:
     """One data set of a mixture, and what to make of it.
 
     Attributes:
@@ -63,7 +63,7 @@ class Mixture:
         seed: Of the choice of held-out groups.
     """
 
-    sources: Sequence[Source]
+    sources: Sequence[LabelSource]
     classes: tuple[str, ...] | None = None
     seed: int = 0
 
@@ -119,7 +119,7 @@ def read_mixture(path: Path) -> Mixture:
     return Mixture(sources, classes, content.get("seed", 0))
 
 
-def _source(entry: object, where: str, folder: Path) -> Source:
+def _source(entry: object, where: str, folder: Path) -> LabelSource:
     if not isinstance(entry, dict) or "path" not in entry:
         raise DataError(expected=f"`path` in {where}", found=repr(entry), fix="write `path: FOLDER or FILE`")
     check_types(entry, _TYPES, where)
@@ -138,7 +138,7 @@ def _source(entry: object, where: str, folder: Path) -> Source:
     weight = float(entry.get("weight", 1.0))
     if not 0.0 < weight < float("inf"):
         raise DataError(expected=f"a `weight` over 0 in {where}", found=str(weight), fix="correct it")
-    return Source(path, entry.get("name", path.name), weight=weight, **chosen)
+    return LabelSource(path, entry.get("name", path.name), weight=weight, **chosen)
 
 
 def _check_splits(entry: Mapping[str, Any], where: str) -> None:

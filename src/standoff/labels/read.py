@@ -15,7 +15,7 @@ from standoff.core.errors import DataError
 from standoff.core.homography import FloatArray
 from standoff.labels.checks import check_boxes, inside
 from standoff.labels.layout import read_negatives, read_set
-from standoff.labels.mixture import DROP, IGNORE, Mixture, Source, is_mixture, read_mixture
+from standoff.labels.mixture import DROP, IGNORE, LabelSource, Mixture, is_mixture, read_mixture
 from standoff.labels.pictures import TURNED
 from standoff.labels.regions import OWN_REGIONS, read_regions
 from standoff.labels.source import BadPicture, SourcePicture, SourceSet
@@ -31,7 +31,7 @@ _NOWHERE: Final = np.zeros((0, 4))
 class _Place:
     """Where a picture belongs."""
 
-    source: Source
+    source: LabelSource
     group: str
     regions_px: FloatArray
 
@@ -75,16 +75,16 @@ def read_data(path: Path) -> LabelledData:
 def _open_mixture(path: Path) -> Mixture:
     if is_mixture(path):
         return read_mixture(path)
-    return Mixture([Source(path, path.resolve().name)])
+    return Mixture([LabelSource(path, path.resolve().name)])
 
 
-def _read_source(source: Source) -> SourceSet:
+def _read_source(source: LabelSource) -> SourceSet:
     if source.negatives:
         return read_negatives(source.path)
     return read_set(source.path, source.names, source.pictures)
 
 
-def _map_labels(source: Source, one: SourceSet) -> dict[str, str]:
+def _map_labels(source: LabelSource, one: SourceSet) -> dict[str, str]:
     """Return what becomes of each label: a class, `ignore` or `drop`."""
     unknown = sorted(set(source.class_map) - set(one.labels) - {"*"})
     if unknown:
@@ -97,7 +97,7 @@ def _map_labels(source: Source, one: SourceSet) -> dict[str, str]:
 
 
 def _class_ids(
-    source: Source, names: Mapping[str, str], one: SourceSet, classes: Sequence[str]
+    source: LabelSource, names: Mapping[str, str], one: SourceSet, classes: Sequence[str]
 ) -> dict[str, int | None]:
     """Return the class id of each label, None where ignored, nothing where dropped."""
     used = {label for picture in one.pictures for label in picture.labels}
@@ -113,7 +113,7 @@ def _class_ids(
 
 
 def _check_source(
-    source: Source, one: SourceSet, class_ids: Mapping[str, int | None], seed: int
+    source: LabelSource, one: SourceSet, class_ids: Mapping[str, int | None], seed: int
 ) -> tuple[dict[Split, list[LabelledPicture]], list[Problem]]:
     """Return the good pictures of each split, and what was wrong with the others."""
     regions = _read_regions(source)
@@ -146,7 +146,7 @@ def _splits_of_groups(groups: Sequence[str], splits: Sequence[Split | None]) -> 
     return {group: [split for split in SPLITS if (group, split) in pairs] for group in dict.fromkeys(groups)}
 
 
-def _cut_groups(source: Source, split_of: Mapping[str, Sequence[Split]]) -> list[Problem]:
+def _cut_groups(source: LabelSource, split_of: Mapping[str, Sequence[Split]]) -> list[Problem]:
     return [
         Problem(source.path, f"'{group}' is in {' and '.join(found)}", CUT_GROUP, skipped_picture=False)
         for group, found in split_of.items()
@@ -154,7 +154,7 @@ def _cut_groups(source: Source, split_of: Mapping[str, Sequence[Split]]) -> list
     ]
 
 
-def _lost_regions(source: Source, regions: Mapping[str, FloatArray], one: SourceSet) -> list[Problem]:
+def _lost_regions(source: LabelSource, regions: Mapping[str, FloatArray], one: SourceSet) -> list[Problem]:
     known = {picture.path.stem for picture in one.pictures} | {problem.path.stem for problem in one.problems}
     return [
         Problem(source.path, f"'{stem}' is no picture", "ignored region of no picture", skipped_picture=False)
@@ -186,14 +186,14 @@ def _label(
     return labelled, boxes.problems
 
 
-def _read_regions(source: Source) -> dict[str, FloatArray]:
+def _read_regions(source: LabelSource) -> dict[str, FloatArray]:
     """Return (N, 4) boxes in which nothing is known, by the stem of the picture."""
     folder = source.path if source.path.is_dir() else source.path.parent
     path = source.ignore_regions or folder / OWN_REGIONS
     return read_regions(path) if source.ignore_regions is not None or path.is_file() else {}
 
 
-def _require_enough(source: Source, good: int, problems: Sequence[Problem]) -> None:
+def _require_enough(source: LabelSource, good: int, problems: Sequence[Problem]) -> None:
     kinds = Counter(problem.kind for problem in problems if problem.skipped_picture)
     skipped = kinds.total()
     if good >= skipped and good > 0:

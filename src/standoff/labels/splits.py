@@ -13,7 +13,7 @@ import numpy as np
 
 from standoff.core.errors import DataError
 from standoff.core.types import IntArray
-from standoff.labels.mixture import Source
+from standoff.labels.mixture import LabelSource
 from standoff.labels.source import SourcePicture
 from standoff.labels.types import LabelledData, LabelledPicture, Split
 
@@ -56,7 +56,7 @@ def flight_of(path: Path) -> str:
 
 
 def split_pictures(
-    source: Source, pictures: Sequence[SourcePicture], groups: Sequence[str], seed: int
+    source: LabelSource, pictures: Sequence[SourcePicture], groups: Sequence[str], seed: int
 ) -> list[Split | None]:
     """Decide the split of each picture of a data set.
 
@@ -96,7 +96,7 @@ def split_pictures(
     return [split_of[group] for group in groups]
 
 
-def is_divided(source: Source, pictures: Sequence[SourcePicture]) -> bool:
+def is_divided(source: LabelSource, pictures: Sequence[SourcePicture]) -> bool:
     """Tell whether the set or the mixture says what is held out."""
     says = source.split is not None or bool(source.groups) or source.held_out is not None
     return says or any(picture.split for picture in pictures)
@@ -183,7 +183,7 @@ def _scene(picture: LabelledPicture) -> str:
     return picture.group.removeprefix(f"{picture.source}/")
 
 
-def _split_as_named(source: Source, groups: Sequence[str]) -> list[Split | None]:
+def _split_as_named(source: LabelSource, groups: Sequence[str]) -> list[Split | None]:
     split_of: dict[str, Split] = {name: split for split, names in source.groups.items() for name in names}
     unknown = sorted(set(split_of) - set(groups))
     if unknown or len(split_of) < sum(len(names) for names in source.groups.values()):

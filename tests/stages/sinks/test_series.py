@@ -7,7 +7,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from standoff.stages.sinks.series import Path, Series
+from standoff.stages.sinks.series import Series, Trail
 
 GAPS = st.lists(st.one_of(st.floats(-20, 60), st.just(float("nan"))), min_size=1, max_size=300)
 
@@ -56,7 +56,7 @@ def test_without_thinning_the_spans_are_exact() -> None:
 
 @given(st.integers(1, 500), st.integers(4, 40))
 def test_a_path_keeps_to_its_capacity_and_to_where_it_was(frames: int, capacity: int) -> None:
-    path = Path("worker 1", 0, capacity)
+    path = Trail("worker 1", 0, capacity)
     for i in range(frames):
         path.add(float(i), -float(i))
     points = path.points_m
@@ -67,7 +67,7 @@ def test_a_path_keeps_to_its_capacity_and_to_where_it_was(frames: int, capacity:
 
 
 def test_a_path_breaks_where_the_position_was_unknown() -> None:
-    path = Path("worker 1", 0, 16)
+    path = Trail("worker 1", 0, 16)
     for i in range(200):
         lost = 60 <= i < 120
         path.add(float("nan") if lost else float(i), 0.0)

@@ -15,7 +15,7 @@ from standoff.core.protocols import Detector, Tracker
 from standoff.evaluation.paper.truth_detector import REFERENCE_MARGIN_PX, BoxError, TrueBoxes
 from standoff.monitor import Monitor
 from standoff.stages.detect import RecordedDetector
-from standoff.stages.frames import Source
+from standoff.stages.frames import FileSource
 from standoff.stages.ground import ReferenceMethod, ReferenceShape, ScaleWatch
 from standoff.stages.locate import Anchor, LocateParams
 from standoff.stages.proximity import ProximityParams
@@ -88,7 +88,7 @@ class Trial:
         return about
 
 
-def build_monitor(clip: Clip, trial: Trial, source: Source) -> Monitor:
+def build_monitor(clip: Clip, trial: Trial, source: FileSource) -> Monitor:
     """Make the monitor for one clip.
 
     Args:

@@ -22,7 +22,7 @@ from standoff.evaluation.paper.truth_detector import without_reference
 from standoff.evaluation.paper.turning import Turning
 from standoff.evaluation.rectification import FAILURE_PX
 from standoff.monitor import Run
-from standoff.stages.frames import Source, open_source
+from standoff.stages.frames import FileSource, open_source
 from standoff.stages.ground import ReferenceShape
 
 NOT_VISIBLE = "not visible"
@@ -131,7 +131,7 @@ def watch(clip: Clip, trial: Trial, on_frame: Callable[[], None] | None = None) 
     return notes.watched
 
 
-def open_clip_video(clip: Clip) -> Source:
+def open_clip_video(clip: Clip) -> FileSource:
     """Open the clip's video.
 
     Raises:

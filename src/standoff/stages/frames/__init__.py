@@ -9,13 +9,13 @@ with open_source("site.mp4", start_s=10.0, every=2) as source:
 
 from standoff.stages.frames.params import SourceParams
 from standoff.stages.frames.pictures import ArrayPicture, AvPicture, Scaler
-from standoff.stages.frames.source import Source, frame_from_array, local_path, open_source
+from standoff.stages.frames.source import FileSource, frame_from_array, local_path, open_source
 
 __all__ = [
     "ArrayPicture",
     "AvPicture",
+    "FileSource",
     "Scaler",
-    "Source",
     "SourceParams",
     "frame_from_array",
     "local_path",

@@ -1,6 +1,6 @@
 """One door to all sources: open it, iterate once, get frames.
 
-A reader knows one kind of source (`video.py`, `folder.py`); `Source` adds what all kinds share: where to
+A reader knows one kind of source (`video.py`, `folder.py`); `FileSource` adds what all kinds share: where to
 stop, the stream's name and the time of capture. A live stream is a third
 reader.
 """
@@ -34,7 +34,7 @@ _ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:/")
 _FILE_ADDRESS = re.compile(r"file:/*(?:/localhost)?/(?P<path>.*)", re.IGNORECASE)
 
 
-class Source(protocols.Source):
+class FileSource(protocols.Source):
     """An opened source; iterate over it once.
 
     Args:
@@ -177,7 +177,7 @@ def open_source(
     every: int = 1,
     fps: float | None = None,
     telemetry: str | PathLike[str] | None = None,
-) -> Source:
+) -> FileSource:
     """Open a video file or a folder of images.
 
     Frames carry the index that they have in the whole source, wherever it is started, and the time since
@@ -217,7 +217,7 @@ def open_source(
     reader: Reader = FolderReader(path, fps) if path.is_dir() else VideoReader(path, fps)
     try:
         chosen = choose_telemetry(reader, path, telemetry)
-        return Source(reader, selection, path.stem if stream_id is None else stream_id, chosen)
+        return FileSource(reader, selection, path.stem if stream_id is None else stream_id, chosen)
     except SourceError:
         reader.close()
         raise

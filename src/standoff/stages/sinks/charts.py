@@ -17,7 +17,7 @@ from standoff.drawing.ground_window import rectify, window_around
 from standoff.drawing.page_charts import INK, MUTED, SURFACE, inline_svg, read_in, themed_figure
 from standoff.drawing.palette import HEX, class_tone
 from standoff.stages.sinks.collect import RunSummary
-from standoff.stages.sinks.series import Path, Series
+from standoff.stages.sinks.series import Series, Trail
 from standoff.stages.sinks.zone_drawing import largest_part
 
 _FAINT_PAIRS = 20
@@ -159,7 +159,7 @@ def _plot_zone(axes: Axes, zone: Zone, low: FloatArray, high: FloatArray) -> Non
         axes.annotate(zone.title, (x_m, y_m), ha="center", va="center", fontsize=8, bbox=box, zorder=2.5)
 
 
-def _plot_path(axes: Axes, path: Path) -> None:
+def _plot_path(axes: Axes, path: Trail) -> None:
     points = path.points_m
     placed = points[np.isfinite(points[:, 0])]
     colour = HEX[class_tone(path.class_id)]
@@ -169,7 +169,7 @@ def _plot_path(axes: Axes, path: Path) -> None:
     axes.plot(*placed[-1], marker="s", markersize=5.5, color=colour, markeredgecolor=SURFACE)
 
 
-def _name_paths(axes: Axes, paths: list[Path], label_size_m: FloatArray) -> None:
+def _name_paths(axes: Axes, paths: list[Trail], label_size_m: FloatArray) -> None:
     """Write the names at the ends, those of the longest paths first, none over another."""
     named: list[FloatArray] = []
     for path in sorted(paths, key=len, reverse=True):

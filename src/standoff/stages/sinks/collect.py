@@ -15,7 +15,7 @@ from standoff.stages.sinks.blurring import PeopleWatch, blur
 from standoff.stages.sinks.moments import WorstMoments
 from standoff.stages.sinks.params import ReportParams, ShowParams
 from standoff.stages.sinks.scene import Scene
-from standoff.stages.sinks.series import Path, Series
+from standoff.stages.sinks.series import Series, Trail
 
 _MOST_HAZARDS = 5000
 _MOST_PATHS = 150
@@ -90,7 +90,7 @@ class RunSummary:
         self.watched_share = Series()
         self.pairs: dict[Pair, Series] = {}
         self.pair_names: dict[Pair, tuple[str, str]] = {}
-        self.paths: dict[int, Path] = {}
+        self.paths: dict[int, Trail] = {}
         self.hazards: dict[str, HazardLife] = {}
         self.first_s = self.last_s = float("nan")
         self.stream_id = ""
@@ -138,7 +138,7 @@ class RunSummary:
         rows = zip(scene.tracks.track_id.tolist(), scene.tracks.class_id.tolist(), scene.positions.xy_m, strict=True)
         for track_id, class_id, (x_m, y_m) in rows:
             if track_id not in self.paths:
-                self.paths[track_id] = Path(names[track_id], class_id)
+                self.paths[track_id] = Trail(names[track_id], class_id)
             self.paths[track_id].add(float(x_m), float(y_m))
         if len(self.paths) > 2 * _MOST_PATHS:
             longest = sorted(self.paths, key=lambda track_id: len(self.paths[track_id]), reverse=True)

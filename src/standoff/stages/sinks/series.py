@@ -95,7 +95,7 @@ class Series:
         return spans
 
 
-class Path:
+class Trail:
     """Where a track went: thinned out evenly when it gets long; breaks are kept.
 
     Args:

@@ -17,7 +17,7 @@ from standoff.core.errors import OutputError
 from standoff.core.protocols import Detector
 from standoff.core.types import Frame, ImageArray
 from standoff.labels.proposals import ProposedPicture, write_coco, write_label_studio
-from standoff.stages.frames import Source, open_source
+from standoff.stages.frames import FileSource, open_source
 from standoff.training.frame_selection.candidates import look_through
 from standoff.training.frame_selection.contact_sheet import Tile, draw_sheet
 from standoff.training.frame_selection.selection import Choice, SelectionParams, choose
@@ -112,14 +112,14 @@ def label_frames(plan: LabelPlan, detector: Detector, folder: Path, progress: Pr
     return LabelReport(len(candidates), tuple(choices), sum(len(one.boxes) for one in proposals), seen)
 
 
-def _every_s(plan: LabelPlan, source: Source) -> float:
+def _every_s(plan: LabelPlan, source: FileSource) -> float:
     if plan.every_s is not None:
         return plan.every_s
     duration_s = source.description["duration_s"]
     return duration_s / (_LOOKED_AT_FOR_ONE * plan.selection.frames) if duration_s else _DEFAULT_EVERY_S
 
 
-def _counted(source: Source, step: Callable[[], None]) -> Iterator[Frame]:
+def _counted(source: FileSource, step: Callable[[], None]) -> Iterator[Frame]:
     for frame in source:
         yield frame
         step()
