@@ -142,6 +142,19 @@ def test_a_replacement_that_is_not_there_is_one_line(factory: str) -> None:
         build_monitor(settings)
 
 
+class Unfinished:
+    """A stage that somebody has begun to write."""
+
+    def detect(self, frame: Frame) -> Detections:
+        return Detections.empty()
+
+
+def test_a_replacement_that_lacks_a_method_is_one_line_that_names_it() -> None:
+    settings = load_settings(overrides={"replace": {"detect": {"factory": "test_config:Unfinished"}}})
+    with pytest.raises(ConfigError, match=r"a Detector, found Unfinished without description, prepare, reset, rests"):
+        build_monitor(settings)
+
+
 def test_a_replacement_that_does_not_take_its_options_is_one_line() -> None:
     settings = load_settings(
         overrides={"replace": {"detect": {"factory": "test_config:Blind", "options": {"mood": 1}}}}

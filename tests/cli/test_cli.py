@@ -233,7 +233,7 @@ def test_a_truncated_video_keeps_what_was_read_and_says_that_it_is_not_all(
     assert pq.read_table(tmp_path / "out" / "frames.parquet").num_rows == record["counts"]["frames"]
 
 
-class Unplugged:
+class Unplugged(protocols.Ground):
     """A ground stage whose sensor is not there."""
 
     def update(self, frame: Frame, detections: Detections, motion: AnyMotion) -> NoGroundMap:

@@ -120,7 +120,7 @@ def test_an_output_that_cannot_be_begun_is_a_failed_run(
     def full(*_words: object) -> None:
         raise FULL
 
-    monkeypatch.setattr("standoff.monitor.open_run.make_sink", full)
+    monkeypatch.setattr("standoff.monitor.opening.make_sink", full)
     code, out, err = call("run", video, "--config", site, "--out", tmp_path / "out", "--quiet")
     assert (code, out, err.count("\n"), "No space left on device" in err) == (2, "", 1, True)
     assert json.loads((tmp_path / "out" / "run.json").read_text())["status"] == "failed"

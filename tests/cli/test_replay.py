@@ -162,7 +162,7 @@ def test_a_replay_can_be_replayed_and_knows_the_true_detector(
 def test_frames_that_were_not_recorded_end_the_replay_in_one_line(
     call: Call, film: Path, recording: Path, tmp_path: Path
 ) -> None:
-    short = monitor(film, recording, tmp_path / "short", every=2, stop_s=0.4)
+    short = monitor(film, recording, tmp_path / "short", source={"every": 2, "stop_s": 0.4})
     code, _, error = call(
         "run", film, "--config", recording, "--out", tmp_path / "replay", "--detections", short, "--quiet"
     )
@@ -187,7 +187,7 @@ def test_frames_that_were_not_recorded_end_the_replay_in_one_line(
 def test_what_cannot_be_replayed_is_one_line_exit_2_and_no_folder(
     call: Call, film: Path, recording: Path, tmp_path: Path, case: str, said: str
 ) -> None:
-    run = monitor(film, recording, tmp_path / "run", stop_s=0.4)
+    run = monitor(film, recording, tmp_path / "run", source={"stop_s": 0.4})
     table = run / "detections.parquet"
     replayed, source, out, more = run, film, tmp_path / "replay", list[object]()
     match case:

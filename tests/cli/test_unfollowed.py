@@ -10,6 +10,7 @@ import yaml
 from cli.calling import Call
 from cli.test_cli import make_video
 
+from standoff.core import protocols
 from standoff.core.protocols import AnyGround, AnyMotion
 from standoff.core.types import Detections, Tracks
 
@@ -19,7 +20,7 @@ def video(tmp_path: Path) -> Path:
     return make_video(tmp_path / "site.mp4", 34)
 
 
-class BlindTracker:
+class BlindTracker(protocols.Tracker):
     """A tracker that follows nobody."""
 
     def update(self, time_s: float, detections: Detections, motion: AnyMotion, ground: AnyGround) -> Tracks:

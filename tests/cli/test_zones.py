@@ -108,7 +108,7 @@ def test_where_nobody_stated_the_site_frame_zones_are_unknown_and_a_warning_says
     assert told == [("zone", "unknown", "opened"), ("zone", "unknown", "closed")]
 
 
-class OwnGround:
+class OwnGround(protocols.Ground):
     """A ground stage of somebody's own that says nothing of where its site frame lies."""
 
     def update(self, frame: Frame, detections: Detections, motion: object) -> object:

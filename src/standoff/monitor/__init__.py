@@ -10,7 +10,7 @@ from standoff.monitor.build import build_monitor
 from standoff.monitor.fan_out import FanOut
 from standoff.monitor.live_queue import LiveQueue, QueueState
 from standoff.monitor.monitor import Monitor
-from standoff.monitor.open_run import open_run
+from standoff.monitor.opening import open_run
 from standoff.monitor.run import Run, warnings_of
 from standoff.monitor.run_folder import RunFolder, RunRecord
 
