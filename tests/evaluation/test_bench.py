@@ -60,7 +60,7 @@ def test_own_work_leaves_out_decoding_inference_and_encoding() -> None:
         "ground": 1.0,
         "track": 2.0,
         "sinks.video": 400.0,
-        "sinks.overlay": 4.0,
+        "sinks.drawing": 4.0,
     }
     times = StageTimes((stage_ms, {"frames": 100.0, "track": 3.0}))
     assert times.own_work().median_ms == (7.0 + 3.0) / 2
@@ -113,7 +113,7 @@ def test_the_made_up_site_is_measured_as_it_is(
 def test_the_workload_runs_all_stages_and_outputs_on_every_frame() -> None:
     times = monitor_workload(SMALL_PX, tracks=5, frames=12)
     by_stage = times.by_stage()
-    assert {"ground", "track", "locate", "proximity", "hazard", "sinks.overlay", "sinks.report"} <= by_stage.keys()
+    assert {"ground", "track", "locate", "proximity", "hazard", "sinks.drawing", "sinks.report"} <= by_stage.keys()
     assert {spread.samples for spread in by_stage.values()} == {11}
     assert 0 < times.own_work().median_ms < times.total().median_ms
 
@@ -161,7 +161,7 @@ def test_a_source_is_timed_with_all_its_outputs_and_nothing_is_left_behind(
     report = bench_source(source, settings, frames=8, workload_frames=10).to_dict()
     json.dumps(report, allow_nan=False)
     assert report["stages"]["track"]["samples"] == 8
-    assert {"sinks.overlay", "sinks.video", "sinks.tracks"} <= report["stages"].keys()
+    assert {"sinks.drawing", "sinks.video", "sinks.tracks"} <= report["stages"].keys()
     assert report["machine"]["processor"]
     assert report["whole"]["frames"] == 7
     assert report["whole"]["frames_per_s"] > 0

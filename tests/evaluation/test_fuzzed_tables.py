@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from laws import examples
 from mutations import mutated
 
-from standoff.clips import read_clip_table, read_detections
+from standoff.clips import RunFolder, read_clip_table, read_detections
 from standoff.clips.detections import COLUMNS, metadata_of
 from standoff.core.errors import DataError
-from standoff.evaluation.positions_input import TRACK_COLUMNS, read_run_table, read_truth
+from standoff.evaluation.positions_input import TRACK_COLUMNS, read_truth
 
 _TRUTH_CSV = b"frame,id,x,y,w,h,conf,X,Y\n" + b"".join(
     f"{frame},{person},10.5,20.25,30,40,1,{frame}.5,-{person}.25\n".encode()
@@ -81,7 +81,7 @@ def read(path: Path, kind: str) -> int:
         return len(read_detections(path).detections)
     if kind == "truth":
         return len(read_clip_table(path.parent, path.name, _TRUTH)["frame"])
-    return len(read_run_table(path, TRACK_COLUMNS)["frame"])
+    return len(RunFolder(path.parent).table("tracks", TRACK_COLUMNS)["frame"])
 
 
 @pytest.mark.parametrize("kind", _PARQUET)

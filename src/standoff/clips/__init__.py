@@ -41,6 +41,7 @@ from standoff.clips.detections import (
     metadata_of,
     read_detections,
 )
+from standoff.clips.run_folder import RunFolder, RunTable
 
 __all__ = [
     "ANNOTATIONS_FILE",
@@ -71,6 +72,8 @@ __all__ = [
     "Column",
     "Columns",
     "RecordedDetections",
+    "RunFolder",
+    "RunTable",
     "TrueBoard",
     "TrueReference",
     "chosen_rows",

@@ -9,15 +9,25 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from standoff.clips import CAMERA_FILE, RENDER_AGAIN, TRUTH_FILE, VIDEO_FILE, Columns, chosen_rows, read_clip_table
-from standoff.core.classes import CLASS_BY_NAME, CLASSES, Role, class_ids
+from standoff.clips import (
+    CAMERA_FILE,
+    PAIRS_FILE,
+    RENDER_AGAIN,
+    TRUTH_FILE,
+    VIDEO_FILE,
+    Columns,
+    RunFolder,
+    chosen_rows,
+    read_clip_table,
+)
+from standoff.core.classes import CLASSES, Role, class_ids
 from standoff.core.errors import DataError
-from standoff.core.homography import BoolArray
+from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import IntArray
 from standoff.evaluation.matching import NOTHING, match_boxes
-from standoff.evaluation.positions_input import TRACK_COLUMNS, read_run_table
+from standoff.evaluation.pair_rows import PAIR_COLUMNS, PairRows, distances_of
+from standoff.evaluation.positions_input import TRACK_COLUMNS
 from standoff.files.fingerprint import fingerprint
-from standoff.files.json_text import read_json
 from standoff.stages.ground import load_camera
 
 WHOLE, HIDDEN, CUT_OFF = range(3)
@@ -29,6 +39,7 @@ _FULL_BOX = tuple(f"full_{edge}" for edge in _BOX)
 _TRUTH = ("frame", "time_s", "entity_id", "class_id", "x_m", "y_m", "visible_share", *_BOX, *_FULL_BOX)
 _TRACKS = (*TRACK_COLUMNS, "sigma_x_m", "sigma_y_m", "cov_xy_m2")
 _FRAMES = ("frame", "time_s", "map_method")
+_PAIRS = ("frame", "entity_a", "entity_b", "centre_m")
 
 _WHOLE_SHARE = 0.9
 """A tenth of a silhouette is what a pole in front of it takes, and the error of truth that is told without pictures."""
@@ -52,6 +63,9 @@ class BesideTruth:
         tracks: Columns of the run's tracks, frame by frame.
         track_row: (T,) row of the track that shows each entity, NOTHING where none does.
         ends: (N,) rows of truth of the person and of the machine of every visible pair.
+        true_m: (N,) their true distance; NaN where there is none: vehicles parked in the street keep no distance.
+        measured_m: (N,) as the run has it; NaN where it has none: not measured, or one of the two not found.
+        sigma_m: (N,) standard error that the run states for it; NaN where it states none.
     """
 
     record: Mapping[str, Any]
@@ -61,12 +75,14 @@ class BesideTruth:
     tracks: Columns
     track_row: IntArray
     ends: tuple[IntArray, IntArray]
+    true_m: FloatArray
+    measured_m: FloatArray
+    sigma_m: FloatArray
 
     @property
     def track_id(self) -> IntArray:
         """(T,) id of the track that shows each entity, NOTHING where none does."""
-        ids: IntArray = np.append(self.tracks["track_id"], NOTHING)[self.track_row]
-        return ids
+        return _ids(self.tracks, self.track_row)
 
     @property
     def is_person(self) -> BoolArray:
@@ -80,7 +96,7 @@ def read_beside_truth(
     """Compare a run's tables with a clip's truth, in every frame that the run read.
 
     Args:
-        run: Folder with `tracks.parquet` and `frames.parquet`.
+        run: Folder with `tracks.parquet`, `proximity.parquet` and `frames.parquet`.
         clip: Folder that `standoff simulate` wrote, with or without a film.
         frame_columns: More of the run's frames than are needed here.
         truth_columns: More of the truth.
@@ -88,15 +104,32 @@ def read_beside_truth(
     Raises:
         DataError: A file is missing or not what it should be, or the run is not one of this clip.
     """
-    frames = read_run_table(run / "frames.parquet", (*_FRAMES, *frame_columns))
+    told = RunFolder(run)
+    frames = told.table("frames", (*_FRAMES, *frame_columns))
     camera = load_camera(clip / CAMERA_FILE)
     size_px = camera.width_px, camera.height_px
     truth = _read_truth(clip, size_px, truth_columns)
-    record = _read_record(run)
+    record = told.record()
     _check_same_film(frames, truth, record, run, clip)
-    truth, tracks = _shown(truth, frames), _read_tracks(run)
+    truth, tracks = _shown(truth, frames), told.tracks(_TRACKS)
     track_row, *ends = _match(truth, tracks)
-    return BesideTruth(record, size_px, frames, truth, tracks, track_row, (ends[0], ends[1]))
+    track_id = _ids(tracks, track_row)
+    frame = truth["frame"][ends[0]]
+    measured_m, sigma_m, _ = distances_of(
+        told.table("proximity", PAIR_COLUMNS), frame, *(track_id[end] for end in ends)
+    )
+    return BesideTruth(
+        record=record,
+        size_px=size_px,
+        frames=frames,
+        truth=truth,
+        tracks=tracks,
+        track_row=track_row,
+        ends=(ends[0], ends[1]),
+        true_m=_true_distances_m(clip, frame, *(truth["entity_id"][end] for end in ends)),
+        measured_m=measured_m,
+        sigma_m=sigma_m,
+    )
 
 
 def read_each(
@@ -115,16 +148,6 @@ def read_each(
         if on_run is not None:
             on_run()
     return samples
-
-
-def _read_record(run: Path) -> Mapping[str, Any]:
-    """Return what the run says of itself; empty where tables alone were kept."""
-    path = run / "run.json"
-    record = read_json(path, "a run's record") if path.is_file() else {}
-    parts = [record.get(name) or {} for name in ("source", "settings")] if isinstance(record, dict) else [None]
-    if not all(isinstance(part, dict) for part in parts):
-        raise DataError(expected="a run's record", found=f"something else in {path}", fix="repeat `standoff run`")
-    return dict(record)
 
 
 def _read_truth(clip: Path, size_px: tuple[int, int], more: Sequence[str]) -> Columns:
@@ -165,17 +188,18 @@ def _shown(truth: Columns, frames: Columns) -> Columns:
     return chosen_rows(truth, rows)
 
 
-def _read_tracks(run: Path) -> Columns:
-    path = run / "tracks.parquet"
-    tracks = read_run_table(path, _TRACKS)
-    names, which = np.unique(tracks["class"].astype(np.str_), return_inverse=True)
-    unknown = sorted(set(names.tolist()) - CLASS_BY_NAME.keys())
-    if unknown:
-        fix = "repeat the run with this version"
-        raise DataError(expected="classes of standoff", found=f"{', '.join(unknown)} in {path}", fix=fix)
-    class_id = np.array([CLASS_BY_NAME[name].id for name in names.tolist()], dtype=np.int64)[which]
-    tracks = {**tracks, "class_id": class_id}
-    return chosen_rows(tracks, np.argsort(tracks["frame"], kind="stable"))
+def _ids(tracks: Columns, track_row: IntArray) -> IntArray:
+    ids: IntArray = np.append(tracks["track_id"], NOTHING)[track_row]
+    return ids
+
+
+def _true_distances_m(clip: Path, frame: IntArray, first: IntArray, second: IntArray) -> FloatArray:
+    """Return (N,) the true distance of each two entities; NaN where the clip has none."""
+    table = read_clip_table(clip, PAIRS_FILE, _PAIRS)
+    row = PairRows(table["frame"], table["entity_a"], table["entity_b"]).find(frame, first, second)
+    true_m = np.full(len(row), np.nan)
+    true_m[row != NOTHING] = table["centre_m"][row[row != NOTHING]]
+    return true_m
 
 
 def _match(truth: Columns, tracks: Columns) -> tuple[IntArray, IntArray, IntArray]:

@@ -9,8 +9,8 @@ from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import IntArray
 from standoff.evaluation.matching import NOTHING
 
-TRUE_PAIR_COLUMNS = ("frame", "entity_a", "entity_b", "centre_m")
-"""Of a clip's table of pairs, what distances are compared with."""
+PAIR_COLUMNS = ("frame", "track_a", "track_b", "distance_m", "sigma_m", "measured")
+"""Of a run's proximity table, what `distances_of` needs."""
 
 
 class PairRows:
@@ -55,7 +55,7 @@ def distances_of(
     """Look up what a run measured between pairs of tracks.
 
     Args:
-        pairs: The run's proximity table: frame, track_a, track_b, distance_m, sigma_m, measured.
+        pairs: The `PAIR_COLUMNS` of the run's proximity table.
         frame: (M,) index of the run's frame.
         first: (M,) id of one track; NOTHING where there is none.
         second: (M,) id of the other.

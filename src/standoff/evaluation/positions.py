@@ -25,18 +25,16 @@ from pathlib import Path
 
 import numpy as np
 
-from standoff.clips import Columns, chosen_rows
+from standoff.clips import Columns, RunFolder, chosen_rows
 from standoff.core.assignment import assign
 from standoff.core.boxes import overlaps
 from standoff.core.errors import DataError
 from standoff.core.homography import FloatArray
 from standoff.core.types import IntArray
 from standoff.evaluation.matching import NOTHING
-from standoff.evaluation.pair_rows import distances_of
+from standoff.evaluation.pair_rows import PAIR_COLUMNS, distances_of
 from standoff.evaluation.positions_input import (
-    PAIR_COLUMNS,
     TRACK_COLUMNS,
-    read_run_table,
     read_truth,
 )
 
@@ -156,8 +154,8 @@ def evaluate_positions(
     Raises:
         DataError: A file is missing or not what it should be, or the run was not asked for such pairs.
     """
-    tracks = read_run_table(Path(run_folder) / "tracks.parquet", TRACK_COLUMNS)
-    pairs = read_run_table(Path(run_folder) / "proximity.parquet", PAIR_COLUMNS)
+    run = RunFolder(Path(run_folder))
+    tracks, pairs = run.table("tracks", TRACK_COLUMNS), run.table("proximity", PAIR_COLUMNS)
     tracks = chosen_rows(tracks, tracks["class"] == class_name)
     return score_positions(
         tracks, pairs, read_truth(truth_file), frames=frames, pairs_up_to_m=pairs_up_to_m, min_overlap=min_overlap

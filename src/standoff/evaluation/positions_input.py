@@ -1,4 +1,4 @@
-"""Read what positions are scored from: a truth file and the tables of a run, as columns of numpy arrays."""
+"""Read what positions are scored against: a truth file, as columns of numpy arrays."""
 
 from __future__ import annotations
 
@@ -10,13 +10,12 @@ import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet
 
-from standoff.clips import Columns, columns_of, read_columns
+from standoff.clips import Columns, columns_of
 from standoff.core.errors import DataError
 from standoff.core.homography import BoolArray, FloatArray
 
 TRUTH_COLUMNS = ("frame", "id", "x", "y", "w", "h", "conf", "X", "Y")
 TRACK_COLUMNS = ("frame", "track_id", "class", "x1_px", "y1_px", "x2_px", "y2_px", "observed", "x_m", "y_m")
-PAIR_COLUMNS = ("frame", "track_a", "track_b", "distance_m", "sigma_m", "measured")
 
 
 def read_truth(path: Path | str) -> Columns:
@@ -44,16 +43,6 @@ def read_truth(path: Path | str) -> Columns:
             line = int(np.flatnonzero(~right)[0]) + 2
             raise DataError(expected=expected, found=f"otherwise in line {line} of {path}", fix="correct the truth")
     return truth
-
-
-def read_run_table(path: Path, names: tuple[str, ...]) -> Columns:
-    """Read columns of one of a run's Parquet tables; what was not measured is NaN.
-
-    Raises:
-        DataError: The table is missing, unreadable, or lacks a column.
-    """
-    fix = f"repeat `standoff run` to its end with {path.stem} among its outputs"
-    return read_columns(path, names, folder="the run folder", fix=fix)
 
 
 def _checks(truth: Columns) -> Mapping[str, BoolArray]:

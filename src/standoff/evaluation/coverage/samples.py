@@ -7,16 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from standoff.clips import PAIRS_FILE, read_clip_table
 from standoff.core.classes import CLASSES
 from standoff.core.homography import FloatArray
 from standoff.core.types import IntArray, TextArray
 from standoff.evaluation.beside_truth import BesideTruth, read_beside_truth
 from standoff.evaluation.coverage.site_frame import rests_on_reference, shared_turning
 from standoff.evaluation.matching import NOTHING
-from standoff.evaluation.pair_rows import TRUE_PAIR_COLUMNS, PairRows, distances_of
 from standoff.evaluation.paper.turning import Turning
-from standoff.evaluation.positions_input import PAIR_COLUMNS, read_run_table
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -88,31 +85,20 @@ def read_samples(run: Path, clip: Path) -> ClipSamples:
         run=run,
         clip=clip,
         frames=len(beside.frames["frame"]),
-        pairs=_pairs(beside, run, clip),
+        pairs=_pairs(beside),
         positions=None if turning is None else _positions(beside, turning),
     )
 
 
-def _pairs(beside: BesideTruth, run: Path, clip: Path) -> PairSamples:
-    truth, ends = beside.truth, beside.ends
-    table = read_clip_table(clip, PAIRS_FILE, TRUE_PAIR_COLUMNS)
-    rows = PairRows(table["frame"], table["entity_a"], table["entity_b"])
-    listed = rows.find(truth["frame"][ends[0]], *(truth["entity_id"][end] for end in ends))
-    # Vehicles parked in the street keep no distance to anybody.
-    ends = ends[0][listed != NOTHING], ends[1][listed != NOTHING]
-    listed = listed[listed != NOTHING]
-    track_id = beside.track_id
-    measured_m, sigma_m, _ = distances_of(
-        read_run_table(run / "proximity.parquet", PAIR_COLUMNS),
-        truth["frame"][ends[0]],
-        *(track_id[end] for end in ends),
-    )
+def _pairs(beside: BesideTruth) -> PairSamples:
+    truth, known = beside.truth, np.isfinite(beside.true_m)
+    ends = beside.ends[0][known], beside.ends[1][known]
     names = _names(truth["class_id"])
     return PairSamples(
         kind=names[ends[0]] + "-" + names[ends[1]],
-        true_m=table["centre_m"][listed],
-        measured_m=measured_m,
-        sigma_m=sigma_m,
+        true_m=beside.true_m[known],
+        measured_m=beside.measured_m[known],
+        sigma_m=beside.sigma_m[known],
         sight=np.maximum(*(truth["sight"][end] for end in ends)),
     )
 

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from standoff.clips import PAIRS_FILE, read_clip_table
 from standoff.core.classes import CLASSES
 from standoff.core.errors import DataError
 from standoff.core.finding import WorkerFinding
@@ -16,8 +15,6 @@ from standoff.core.types import IntArray
 from standoff.core.watched_ground import COLUMNS, ROWS, cell_of
 from standoff.evaluation.beside_truth import WHOLE, BesideTruth, read_beside_truth
 from standoff.evaluation.matching import NOTHING
-from standoff.evaluation.pair_rows import TRUE_PAIR_COLUMNS, PairRows, distances_of
-from standoff.evaluation.positions_input import PAIR_COLUMNS, read_run_table
 
 _RADIUS_M = np.array([site_class.action_radius_m for site_class in CLASSES])
 
@@ -74,7 +71,7 @@ def read_worker_samples(run: Path, clip: Path) -> WorkerSamples:
     asked = np.flatnonzero(beside.is_person & inside)
     cells = _cells(frames["watched_cells"], run)
     row = np.searchsorted(frames["frame"], truth["frame"][asked])
-    in_breach, called_clear = _breaches(beside, run, clip)
+    in_breach, called_clear = _breaches(beside)
     detector = WorkerFinding.of_detector(beside.record.get("model") or {})
     height_px = (truth["full_y2_px"] - truth["full_y1_px"])[asked]
     return WorkerSamples(
@@ -103,20 +100,13 @@ def _cells(column: FloatArray, run: Path) -> IntArray:
         ) from error
 
 
-def _breaches(beside: BesideTruth, run: Path, clip: Path) -> tuple[BoolArray, BoolArray]:
+def _breaches(beside: BesideTruth) -> tuple[BoolArray, BoolArray]:
     """Return (T,) whether each person is in a breach, and whether a breach of his is called clear."""
     truth, (people, machines) = beside.truth, beside.ends
-    table = read_clip_table(clip, PAIRS_FILE, TRUE_PAIR_COLUMNS)
-    frame, ids = truth["frame"][people], truth["entity_id"]
-    row = PairRows(table["frame"], table["entity_a"], table["entity_b"]).find(frame, ids[people], ids[machines])
     radii_m = _RADIUS_M[truth["class_id"][people]] + _RADIUS_M[truth["class_id"][machines]]
-    breach = (row != NOTHING) & (table["centre_m"][row] < radii_m)
-    tracks = beside.track_id
-    measured_m, _, _ = distances_of(
-        read_run_table(run / "proximity.parquet", PAIR_COLUMNS), frame, tracks[people], tracks[machines]
-    )
-    silent = (tracks[people] == NOTHING) | (measured_m - radii_m >= _CLEAR_GAP_M)
-    in_breach, called_clear = (np.zeros(len(ids), dtype=np.bool_) for _ in range(2))
+    breach = beside.true_m < radii_m
+    silent = (beside.track_id[people] == NOTHING) | (beside.measured_m - radii_m >= _CLEAR_GAP_M)
+    in_breach, called_clear = (np.zeros(len(truth["frame"]), dtype=np.bool_) for _ in range(2))
     in_breach[people[breach]] = True
     called_clear[people[breach & silent]] = True
     return in_breach, called_clear
