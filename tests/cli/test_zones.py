@@ -14,7 +14,7 @@ from files.test_zone_file import collection, feature
 from pages import PageReader
 
 from standoff.core import protocols
-from standoff.core.types import Detections, Frame
+from standoff.core.types import Detections, Frame, GroundMap
 from standoff.files.zone_file import read_zones
 
 RING = [[5.0, 5.0], [8.0, 5.0], [8.0, 7.0], [5.0, 7.0], [5.0, 5.0]]
@@ -111,9 +111,7 @@ def test_where_nobody_stated_the_site_frame_zones_are_unknown_and_a_warning_says
 class OwnGround(protocols.Ground):
     """A ground stage of somebody's own that says nothing of where its site frame lies."""
 
-    def update(self, frame: Frame, detections: Detections, motion: object) -> object:
-        from standoff.core.types import GroundMap
-
+    def update(self, frame: Frame, detections: Detections, motion: object) -> GroundMap:
         matrix = np.array([[0.05, 0.0, 0.0], [0.0, -0.05, 12.0], [0.0, 0.0, 1.0]])
         return GroundMap(matrix, np.zeros((9, 9)), frame.size_px, "own", 0.05)
 
