@@ -58,11 +58,12 @@ def test_a_run_without_frames_has_none_to_give(tmp_path: Path) -> None:
 
 def test_another_source_is_refused_before_a_frame_is_read(detector: RecordedDetector) -> None:
     detector.check_source(SOURCE)
-    detector.check_source({"size_px": [320, 180]})
+    detector.check_source({"name": "a source without a fingerprint"})
+    detector.prepare((320, 180))
     with pytest.raises(DataError, match=r"site.mp4.*other.mp4 with other content"):
         detector.check_source({**SOURCE, "name": "other.mp4", "fingerprint": "abd"})
     with pytest.raises(DataError, match="640x360"):
-        detector.check_source({**SOURCE, "size_px": [640, 360]})
+        detector.prepare((640, 360))
 
 
 def test_the_description_names_the_recording_and_the_true_detector(detector: RecordedDetector, tmp_path: Path) -> None:
