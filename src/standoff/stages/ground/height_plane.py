@@ -27,6 +27,8 @@ _USUAL_COUNTS: Final = 2.0
 """For so many heights what is usual counts beside those that were surveyed."""
 _DOUBTFUL: Final = 4.0
 """Standard deviations off the plane of the others from which a height is rather a mistake, or no ground."""
+_MOUND_M: Final = 0.25
+"""So far off the plane, once and again, is ground of any site."""
 _STEEPEST_DEG: Final = 35.0
 """Loose ground does not stand steeper, nor do machines."""
 _ROUGHEST: Final = 0.15
@@ -189,8 +191,14 @@ def _most_agreed(terms: FloatArray, heights: FloatArray) -> FloatArray:
 
 
 def _scatter(off_m: FloatArray) -> float:
-    """Return the standard deviation of residuals of which some may be mistakes, and never less than is usual."""
-    return max(1.4826 * float(np.median(np.abs(off_m))), _USUAL_RELIEF_M)
+    """Return the standard deviation of residuals of which some may be mistakes; kerbs and mounds are none.
+
+    Source:
+        Rousseeuw and Leroy, Robust Regression and Outlier Detection, 1987, section 5.1, with its correction for the
+        few residuals that are nearly nought because the plane goes through three of them.
+    """
+    few = 1.0 + 5.0 / max(len(off_m) - 3, 1)
+    return max(1.4826 * few * float(np.median(np.abs(off_m))), _MOUND_M)
 
 
 def _check_spread(points_m: FloatArray, names: Sequence[str]) -> None:
