@@ -19,7 +19,7 @@ class Relief:
 
     Attributes:
         sigma_m: Standard deviation of the ground's height about the plane, where it was surveyed.
-        plane_covariance: (3, 3) of the plane's height at the site's origin, m2, and of its rises a metre east and north.
+        plane_covariance: (3, 3) of the plane's height at the site's origin, and of its rises a metre east and north.
         surveyed_m: (P, 2) where heights were surveyed, site frame; P >= 1.
 
     >>> relief = Relief(0.1, np.zeros((3, 3)), np.zeros((1, 2)))

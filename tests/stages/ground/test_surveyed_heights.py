@@ -80,6 +80,7 @@ def test_points_off_the_plane_do_not_bend_the_map(seed: int, camera_is_known: bo
     lift_m = survey.plane.height_m - 102.0
     lifted = replace(fitted, view=replace(site.view, position_m=site.view.position_m - [0.0, 0.0, lift_m]))
     assert worst_m(updated(survey), lifted, others_m) < OFF_PLANE_M
+    assert worst_m(carried(survey, site.view.camera), lifted, others_m) < OFF_PLANE_M
     assert worst_m(updated(survey), lifted, others_m) < 0.5 * worst_m(updated(plain), lifted, others_m)
 
 

@@ -88,8 +88,10 @@ class HeightPlane:
 
     @property
     def plane_to_site(self) -> FloatArray:
-        """(3, 3) rotation from the plane's frame to the site's: its origin is on the plane above the site's, w square to
-        it; where the plane is level both are the same but for the height."""
+        """(3, 3) rotation from the plane's frame to the site's; where the plane is level both have the same axes.
+
+        The origin of the plane's frame is on the plane, above or below the site's.
+        """
         normal = np.array([-self.rise[0], -self.rise[1], 1.0])
         normal /= np.linalg.norm(normal)
         axis = np.array([-normal[1], normal[0], 0.0])

@@ -1,4 +1,4 @@
-"""From the site to the frame of a sloping plane and back: there the ground is z = 0, and what follows a camera works there."""
+"""From the site to the frame of a sloping plane, in which the ground is z = 0 and cameras are followed, and back."""
 
 from __future__ import annotations
 

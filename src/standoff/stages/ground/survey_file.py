@@ -10,8 +10,8 @@
     point_sigma_px: 1.0                # optional: how well a point was read, one coordinate
     time_s: 0.0                        # where the camera moves: when the picture was taken, by the film's clock
 
-Where three or more points that are not on a line have a height `z_m`, metres upwards from any level, the ground is the plane
-through these heights, sloping as it may; distances stay horizontal.
+Where three or more points that are not on a line have a height `z_m`, metres upwards from any level, the ground is the
+plane through these heights, sloping as it may; distances stay horizontal.
 
 A point has either `m`, or `lonlat: [8.543210, 50.123456]`: degrees of longitude and latitude (WGS 84), which become
 metres east and north of the first point.

@@ -63,8 +63,8 @@ class LocateParams:
         float,
         Ge(0),
         Doc(
-            "Standard deviation of the ground's height about the plane of the map, where things stand; surveyed heights "
-            "tell it better."
+            "Standard deviation of the ground's height about the plane of the map, where things stand. Surveyed "
+            "heights take its place."
         ),
     ] = 0.1
     cut_off_margin_px: Annotated[
