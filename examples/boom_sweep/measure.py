@@ -6,7 +6,8 @@ Each machine of the simulator digs or grades for half a minute, seen five times 
 looks down 28 to 75 degrees. Its boxes have the errors of the shipped detector (`standoff.simulation.detection_noise`),
 its ground points are 0.67 m off in each coordinate, three tenths of the variance for half a second and the rest for
 good. Eight workers stand about it, beyond the counterweight and inside both action radii (14.1 m). The stage locate
-places them; `boom.py` tells the direction, `sweep.py` who is excused, for each look-ahead.
+places them; `boom.py` tells the direction, `sweep.py` who is excused, for each look-ahead: by that direction, and by
+the true direction and rate of swing.
 
 Struck within three seconds: the worker's circle of 2 m is touched by the bucket, by where it will truly be. Lost:
 struck, and excused all the same.
@@ -16,6 +17,7 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from boom import Booms
@@ -40,6 +42,7 @@ STEP_S, LASTS_S, STRUCK_WITHIN_S = 0.2, 30.0, 3.0
 FOOT_SIGMA_M, CHANGING_SHARE = 0.67, 0.3
 WORKERS, FROM_M, TO_M, WORKER_M, BUCKET_M = 8, 5.2, 14.1, 2.0, 0.8
 LOOK_AHEADS_S = (1.0, 2.0, 3.0)
+TOLD_BY = ("box", "truth")
 EXCAVATOR, WORKER = CLASS_BY_NAME["excavator"].id, CLASS_BY_NAME["worker"].id
 
 
@@ -100,8 +103,8 @@ def lasting(rng: np.random.Generator, count: int, columns: int) -> FloatArray:
     return np.array(rows)
 
 
-def follow(work: Work, rng: np.random.Generator) -> tuple[FloatArray, dict[float, FloatArray]]:
-    """Return (N, 2) the direction's errors and their stated standard errors; counts of worker-frames by look-ahead.
+def follow(work: Work, rng: np.random.Generator) -> tuple[FloatArray, dict[tuple[str, float], FloatArray]]:
+    """Return (N, 2) the direction's errors and their stated standard errors; counts of worker-frames by rule.
 
     The counts are (4,): all, excused, struck soon, lost.
     """
@@ -117,7 +120,7 @@ def follow(work: Work, rng: np.random.Generator) -> tuple[FloatArray, dict[float
     beside_m = ground.to_ground(np.array([[0.0, 0.0], [1.0, 0.0]]) + work.view.project(np.zeros((1, 3))))[0]
     m_per_px = float(np.linalg.norm(beside_m[1] - beside_m[0]))
     locator, booms = Locator(), Booms()
-    errors, counts = [], {ahead_s: np.zeros(4) for ahead_s in LOOK_AHEADS_S}
+    errors, counts = [], {rule: np.zeros(4) for rule in product(TOLD_BY, LOOK_AHEADS_S)}
     machine, people = np.zeros(WORKERS, dtype=np.int64), np.arange(1, WORKERS + 1)
     soon = round(STRUCK_WITHIN_S / STEP_S)
     for k in range(count):
@@ -148,8 +151,11 @@ def follow(work: Work, rng: np.random.Generator) -> tuple[FloatArray, dict[float
         for later in range(k, k + soon + 1):
             apart = np.abs(np.angle(np.exp(1j * (angle - work.swing_rad[later]))))
             struck |= (apart < np.arcsin((WORKER_M + BUCKET_M) / away_m)) & (away_m < work.reach_m[later] + WORKER_M)
-        for ahead_s, tally in counts.items():
-            excused = out_of_sweep(positions, boom, machine, people, ahead_s)
+        true_boom = np.full_like(boom, np.nan)
+        true_boom[0] = work.swing_rad[k], 0.0, (work.swing_rad[k + 1] - work.swing_rad[k - 1]) / (2.0 * STEP_S), 0.0
+        booms_by = {"box": boom, "truth": true_boom}
+        for (told_by, ahead_s), tally in counts.items():
+            excused = out_of_sweep(positions, booms_by[told_by], machine, people, ahead_s)
             tally += [WORKERS, excused.sum(), struck.sum(), (struck & excused).sum()]
     return np.array(errors).reshape(-1, 2), counts
 
@@ -160,7 +166,7 @@ def main() -> None:
     parser.add_argument("--machines", type=int, default=20)
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
-    errors, totals = [], {ahead_s: np.zeros(4) for ahead_s in LOOK_AHEADS_S}
+    errors, totals = [], {rule: np.zeros(4) for rule in product(TOLD_BY, LOOK_AHEADS_S)}
     for number in range(options.machines):
         rng = np.random.default_rng([options.seed, number])
         try:
@@ -169,18 +175,18 @@ def main() -> None:
             continue
         found, counts = follow(work, rng)
         errors.append(found)
-        totals = {ahead_s: tally + counts[ahead_s] for ahead_s, tally in totals.items()}
+        totals = {rule: tally + counts[rule] for rule, tally in totals.items()}
     off_deg, sigma_deg = np.abs(np.rad2deg(np.concatenate(errors))).T
     inside = [100.0 * float(np.mean(off_deg < z * sigma_deg)) for z in (1.0, 1.96)]
     print(
-        f"{len(errors)} machines, {len(off_deg)} looks: direction off by {np.median(off_deg):.1f} degrees in the middle, "
+        f"{len(errors)} machines, {len(off_deg)} looks: direction off by {np.median(off_deg):.1f} degrees (median), "
         f"p95 {np.percentile(off_deg, 95):.1f}, more than 60 in {100.0 * np.mean(off_deg > 60.0):.1f} %; stated "
         f"{np.median(sigma_deg):.1f}; inside 68 % {inside[0]:.0f}, 95 % {inside[1]:.0f}"
     )
-    for ahead_s, (every, excused, struck, lost) in totals.items():
+    for (told_by, ahead_s), (every, excused, struck, lost) in totals.items():
         print(
-            f"look-ahead {ahead_s:g} s: {100.0 * excused / every:.1f} % of {every:.0f} worker-frames excused; "
-            f"{struck:.0f} struck within {STRUCK_WITHIN_S:g} s, {lost:.0f} of them excused"
+            f"direction by {told_by}, look-ahead {ahead_s:g} s: {100.0 * excused / every:.1f} % of {every:.0f} "
+            f"worker-frames excused; {struck:.0f} struck within {STRUCK_WITHIN_S:g} s, {lost:.0f} of them excused"
         )
 
 

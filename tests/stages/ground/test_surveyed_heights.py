@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 from sloping_site import SlopingSite, places_m, sloping_site
 from stages.ground.test_surveyed import STILL, blank_frame, refusal, updated
-from tolerances import GROUND_THROUGH_LENS_M, OFF_PLANE_M
+from tolerances import GROUND_THROUGH_LENS_M, OFF_PLANE_M, RELIEF_COVERAGE
 
 from standoff.core.camera import Camera, CameraPrior
 from standoff.core.errors import GroundError
 from standoff.core.homography import FloatArray
 from standoff.core.types import Detections, GroundMap
+from standoff.simulation.relief import make_relief
+from standoff.simulation.terrain_plan import TerrainPlan
 from standoff.stages.ground import FusedGround, FusedParams, MarkerPlace, Reference, ReferenceShape, load_survey
 from standoff.stages.ground.height_plane import fit_heights
 from standoff.stages.ground.plane_frame import laid_marker, laid_reference
@@ -98,6 +100,23 @@ def test_relief_is_least_where_it_was_surveyed_and_grows_away(seed: int) -> None
     outwards_m = np.array([[np.cos(seed), np.sin(seed)]]) * np.array([[5.0], [10.0], [20.0], [40.0]])
     sigma_m = plane.relief.sigma_at(outwards_m)
     assert plane.relief.sigma_m < sigma_m[0] and (np.diff(sigma_m) > 0).all()
+
+
+def test_ground_of_any_terrain_is_as_near_to_the_plane_as_is_stated() -> None:
+    off_in_sigmas = []
+    for seed in range(12):
+        rng = np.random.default_rng([seed, 73])
+        plan = TerrainPlan(cell_m=1.0, relief_m=float(rng.uniform(0.03, 0.2)), roughness=float(rng.uniform(0.0, 0.8)))
+        height_m = make_relief(rng, plan)
+        middle = (np.array(height_m.shape) - 1) // 2
+        surveyed_cells = middle + rng.integers(-12, 13, (8, 2))
+        others = middle + rng.integers(-40, 41, (200, 2))
+        rise = rng.uniform(-0.15, 0.15, 2)
+        told_m, true_m = (height_m[cells[:, 0], cells[:, 1]] + cells @ rise for cells in (surveyed_cells, others))
+        plane = fit_heights(surveyed_cells.astype(np.float64), told_m, "abcdefgh")
+        off_m = true_m - plane.height_m - others @ plane.rise
+        off_in_sigmas.append(off_m / plane.relief.sigma_at(others))
+    assert float(np.mean(np.abs(np.concatenate(off_in_sigmas)) < 1.96)) > RELIEF_COVERAGE
 
 
 @pytest.mark.parametrize("waves_m", [0.05, 0.3])
