@@ -150,9 +150,19 @@ class _Boom:
         """Draw what can be, before the first look."""
         rng, count = np.random.default_rng([track_id, 20]), _PARTICLES
         off_m = rng.multivariate_normal(np.zeros(2), covariance_m2 + _PLACE_SIGMA_M**2 * np.eye(2), count)
-        some = [rng.normal(*usual, count) for usual in (_REACH_M, _APEX_M, _TIP_M)]
-        turns = rng.uniform(0.0, 2.0 * np.pi, count), rng.normal(0.0, _SWING_RADPS, count)
-        return cls(rng, np.exp(rng.normal(0.0, _SIZE_SIGMA, count)), off_m, *turns, *some, time_s, 0, NOT_TOLD)
+        return cls(
+            rng=rng,
+            size=np.exp(rng.normal(0.0, _SIZE_SIGMA, count)),
+            off_m=off_m,
+            swing_rad=rng.uniform(0.0, 2.0 * np.pi, count),
+            rate_radps=rng.normal(0.0, _SWING_RADPS, count),
+            reach_m=rng.normal(*_REACH_M, count),
+            apex_m=rng.normal(*_APEX_M, count),
+            tip_m=rng.normal(*_TIP_M, count),
+            looked_s=time_s,
+            looks=0,
+            now=NOT_TOLD,
+        )
 
     def told(self, time_s: float) -> FloatArray:
         """Return the row of `Booms.update` at a time."""
