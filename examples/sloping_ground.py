@@ -72,7 +72,8 @@ def in_picture(site: Site, rng: np.random.Generator, count: int, within_m: float
     xy_m = rng.uniform(-within_m, within_m, (40 * count, 2))
     px = site.view.project(np.column_stack([xy_m, site.heights_m(xy_m)]))
     shown = ((px > 30.0) & (px < np.array(SIZE_PX) - 30.0)).all(axis=1) & (np.hypot(*xy_m.T) < within_m)
-    return xy_m[shown][:count]
+    chosen_m: FloatArray = xy_m[shown][:count]
+    return chosen_m
 
 
 def maps(site: Site, rng: np.random.Generator) -> dict[tuple[str, str], GroundMap]:
@@ -109,8 +110,8 @@ def errors(ground: GroundMap, feet_px: FloatArray, xy_m: FloatArray) -> FloatArr
     positions = Locator().update(0.0, tracks, ground)
     pairs = ProximityMeter(ProximityParams(pairs=(("worker", "worker"),))).update(0.0, positions, ground)
     truth_m = np.linalg.norm(xy_m[pairs.track_a] - xy_m[pairs.track_b], axis=1)
-    rows = np.column_stack([pairs.distance_m - truth_m, pairs.sigma_m])
-    return rows[(truth_m < LONGEST_M) & np.isfinite(rows).all(axis=1)]
+    rows: FloatArray = np.column_stack([pairs.distance_m - truth_m, pairs.sigma_m])
+    return np.asarray(rows[(truth_m < LONGEST_M) & np.isfinite(rows).all(axis=1)], dtype=np.float64)
 
 
 def main() -> None:

@@ -18,7 +18,7 @@ import numpy as np
 
 from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.errors import GroundError
-from standoff.core.homography import FloatArray
+from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.pose import View, view_from_homography
 from standoff.core.types import GroundMap, Tracks
 
@@ -93,8 +93,9 @@ class Booms:
         self._booms = {track: boom for track, boom in self._booms.items() if track in ids}
         if view is None:
             return told
-        whole = (tracks.xyxy_px[:, :2] > _MARGIN_PX).all(axis=1)
-        whole &= (tracks.xyxy_px[:, 2:] < np.array(ground.image_size_px) - 1.0 - _MARGIN_PX).all(axis=1)
+        far_px = np.array(ground.image_size_px) - 1.0 - _MARGIN_PX
+        within = np.concatenate([tracks.xyxy_px[:, :2] > _MARGIN_PX, tracks.xyxy_px[:, 2:] < far_px], axis=1)
+        whole: BoolArray = within.all(axis=1)
         for row, track in zip(rows.tolist(), ids, strict=True):
             if tracks.observed[row] and whole[row]:
                 boom = self._booms.get(track)

@@ -61,4 +61,5 @@ def furthest_turn(rate_radps: FloatArray, ahead_s: float) -> FloatArray:
     rate_radps = np.minimum(rate_radps, _FASTEST_RADPS)
     speeding_s = np.minimum((_FASTEST_RADPS - rate_radps) / _STARTS_RADPS2, ahead_s)
     turned: FloatArray = (rate_radps + 0.5 * _STARTS_RADPS2 * speeding_s) * speeding_s
-    return turned + (ahead_s - speeding_s) * _FASTEST_RADPS
+    turned += (ahead_s - speeding_s) * _FASTEST_RADPS
+    return turned

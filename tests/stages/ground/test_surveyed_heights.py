@@ -111,11 +111,12 @@ def test_ground_of_any_terrain_is_as_near_to_the_plane_as_is_stated() -> None:
         middle = (np.array(height_m.shape) - 1) // 2
         surveyed_cells = middle + rng.integers(-12, 13, (8, 2))
         others = middle + rng.integers(-40, 41, (200, 2))
+        others_m = others.astype(np.float64)
         rise = rng.uniform(-0.15, 0.15, 2)
         told_m, true_m = (height_m[cells[:, 0], cells[:, 1]] + cells @ rise for cells in (surveyed_cells, others))
         plane = fit_heights(surveyed_cells.astype(np.float64), told_m, "abcdefgh")
-        off_m = true_m - plane.height_m - others @ plane.rise
-        off_in_sigmas.append(off_m / plane.relief.sigma_at(others))
+        off_m = true_m - plane.height_m - others_m @ plane.rise
+        off_in_sigmas.append(off_m / plane.relief.sigma_at(others_m))
     assert float(np.mean(np.abs(np.concatenate(off_in_sigmas)) < 1.96)) > RELIEF_COVERAGE
 
 

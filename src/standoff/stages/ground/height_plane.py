@@ -123,13 +123,14 @@ def fit_heights(points_m: FloatArray, heights_m: FloatArray, names: Sequence[str
         GroundError: Fewer than three heights, heights on a line, or of no ground that a plane is.
     """
     given = np.flatnonzero(np.isfinite(heights_m))
-    _check_spread(points_m[given], [names[k] for k in given])
+    named = [names[k] for k in given.tolist()]
+    _check_spread(points_m[given], named)
     terms = np.column_stack([np.ones(len(given)), points_m[given]])
     heights = heights_m[given]
     off = heights - terms @ _most_agreed(terms, heights)
     believed = np.abs(off) <= _DOUBTFUL * _scatter(off)
     inlying = terms[believed]
-    plane = np.linalg.lstsq(inlying, heights[believed], rcond=None)[0]
+    plane = np.asarray(np.linalg.lstsq(inlying, heights[believed], rcond=None)[0], dtype=np.float64)
     off = heights - terms @ plane
     squares = float((off[believed] ** 2).sum()) + _USUAL_COUNTS * _USUAL_RELIEF_M**2
     sigma_m = float(np.sqrt(squares / (_USUAL_COUNTS + max(int(believed.sum()) - 3, 0))))
@@ -141,7 +142,7 @@ def fit_heights(points_m: FloatArray, heights_m: FloatArray, names: Sequence[str
         rise=plane[1:],
         relief=Relief(sigma_m, sigma_m**2 * np.linalg.inv(inlying.T @ inlying), inlying[:, 1:]),
         off_m=off_m,
-        doubtful=tuple(names[k] for k in given[~believed]),
+        doubtful=tuple(name for name, good in zip(named, believed, strict=True) if not good),
     )
 
 

@@ -87,10 +87,10 @@ class SurveyedGround:
         ideal_px = _undistorted(seen_px, camera, names)
         self.points_m, self.time_s, self.origin = surveyed_m, time_s, origin
         self.plane = _plane(surveyed_m, heights_m, names)
-        on_plane_px, found = ideal_px, True
+        on_plane_px, laid = ideal_px, True
         if self.plane is not None:
             prior = CameraPrior.unknown(*image_size_px) if camera is None else CameraPrior.calibrated(camera)
-            on_plane_px, found = laid_on_plane(self.plane, seen_px, ideal_px, surveyed_m, prior)
+            on_plane_px, laid = laid_on_plane(self.plane, seen_px, ideal_px, surveyed_m, prior)
         self.fit = fit_survey(on_plane_px, surveyed_m, names, point_sigma_px)
         self._surveyed = GroundMap(
             image_to_ground=self.fit.image_to_ground,
@@ -110,7 +110,7 @@ class SurveyedGround:
         if self.plane is not None:
             self.description["heights"] = self.plane.description
             self.description["basis"] += f"; {self.plane.text}"
-            self.description["warnings"] += self.plane.warnings + ([] if found else [NOT_LAID])
+            self.description["warnings"] += self.plane.warnings + ([] if laid else [NOT_LAID])
 
     @property
     def is_mirrored(self) -> bool:
