@@ -24,7 +24,7 @@ from standoff.core.types import GroundMap, Tracks
 
 _EXCAVATOR: Final = CLASS_BY_NAME["excavator"].id
 _PARTICLES: Final = 2000
-"""With 400 one view in twenty is locked onto a wrong direction that looks certain; with 2000 none of 35."""
+"""With 400 a view in twenty was locked onto a wrong direction that looked certain."""
 _EVERY_S: Final = 0.2 - 1e-6
 _LOOKS, _FORGOTTEN_S = 10, 0.5
 """Looks before a direction is told, and the time for which one holds after the last look."""
@@ -95,7 +95,7 @@ class Booms:
             return told
         far_px = np.array(ground.image_size_px) - 1.0 - _MARGIN_PX
         within = np.concatenate([tracks.xyxy_px[:, :2] > _MARGIN_PX, tracks.xyxy_px[:, 2:] < far_px], axis=1)
-        whole: BoolArray = within.all(axis=1)
+        whole: BoolArray = np.asarray(within.all(axis=1))
         for row, track in zip(rows.tolist(), ids, strict=True):
             if tracks.observed[row] and whole[row]:
                 boom = self._booms.get(track)

@@ -1,4 +1,4 @@
-"""Who stands where an excavator's boom cannot come soon, and its tail does not either: a rule that was tried."""
+"""Who stands where an excavator's boom cannot come soon, and its tail does not either: a rule that was left out."""
 
 from __future__ import annotations
 
