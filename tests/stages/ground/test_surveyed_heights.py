@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from drawn_ground import frame
 from sloping_site import SlopingSite, places_m, sloping_site
 from stages.ground.test_surveyed import STILL, blank_frame, refusal, updated
 from tolerances import GROUND_THROUGH_LENS_M, OFF_PLANE_M, RELIEF_COVERAGE
@@ -14,18 +15,35 @@ from tolerances import GROUND_THROUGH_LENS_M, OFF_PLANE_M, RELIEF_COVERAGE
 from standoff.core.camera import Camera, CameraPrior
 from standoff.core.errors import GroundError
 from standoff.core.homography import FloatArray
-from standoff.core.types import Detections, GroundMap
+from standoff.core.map_error import map_jacobian
+from standoff.core.telemetry import Telemetry
+from standoff.core.types import Detections, GroundMap, NoGroundMap
+from standoff.evaluation.drawn_markers import Hardship, draw_marker, through_camera
 from standoff.simulation.relief import make_relief
 from standoff.simulation.terrain_plan import TerrainPlan
-from standoff.stages.ground import FusedGround, FusedParams, MarkerPlace, Reference, ReferenceShape, load_survey
+from standoff.stages.ground import (
+    FusedGround,
+    FusedParams,
+    MarkerObserver,
+    MarkerPlace,
+    Reference,
+    ReferenceShape,
+    load_survey,
+    map_from_view,
+    marker_pattern,
+)
 from standoff.stages.ground.height_plane import fit_heights
-from standoff.stages.ground.plane_frame import laid_marker, laid_reference
+from standoff.stages.ground.plane_frame import laid_marker, laid_reference, map_in_site
 from standoff.stages.ground.surveyed import SurveyedGround
 from standoff.stages.locate import LocateParams
 from standoff.stages.locate.uncertainty import relief_covariance
 
 SEEDS = [1, 2, 3]
 SIZE_PX = (1280, 720)
+READINGS = Telemetry(
+    0.0, "drawn", height_m=20.0, height_sigma_m=0.5, heading_deg=10.0, heading_sigma_deg=2.0, pitch_deg=50.0,
+    pitch_sigma_deg=0.5, roll_deg=0.0, roll_sigma_deg=0.5, latitude_deg=50.0, longitude_deg=8.0, position_sigma_m=1.0,
+)  # fmt: skip
 
 
 def surveyed(site: SlopingSite, xy_m: FloatArray, *, camera: Camera | None, heights: bool = True) -> SurveyedGround:
@@ -196,3 +214,76 @@ def test_what_lies_on_a_slope_keeps_its_size_and_its_place(seed: int) -> None:
     np.testing.assert_allclose(np.linalg.norm(np.roll(corners_m, -1, axis=0) - corners_m, axis=1), 2.0)
     back_m = np.column_stack([corners_m, np.zeros(4)]) @ plane.plane_to_site.T
     np.testing.assert_allclose(back_m.mean(axis=0)[:2], [10.0, 1.0], atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_error_of_a_place_is_that_on_the_plane_seen_from_above(seed: int) -> None:
+    site, xy_m = sloping_site(seed, slope_deg=13.0), places_m(seed, 6)
+    plane = fit_heights(xy_m, site.heights_m(xy_m), "abcdef")
+    spread = np.random.default_rng([seed, 74]).normal(size=(8, 8)) * 1e-3
+    # In the plane's frame the camera is somewhere else; any view of z = 0 will do.
+    on_plane = map_from_view(
+        site.view.changed(np.array([0.0, 0.0, 0.0, 0.0, 0.0, -102.0, 0.0, 0.0])),
+        spread @ spread.T, method="drawn", scale_m_per_px=0.02, anchors_px=np.zeros((0, 2)),
+    )  # fmt: skip
+    in_site, point_px = map_in_site(on_plane, plane), np.array([[500.0, 420.0]])
+    turned = plane.plane_to_site[:2, :2]
+    covariances = []
+    for ground in (on_plane, in_site):
+        by_map = map_jacobian(ground, ground.undistorted(point_px))[0]
+        covariances.append(by_map @ ground.covariance @ by_map.T)
+    np.testing.assert_allclose(covariances[1], turned @ covariances[0] @ turned.T, rtol=1e-9)
+    np.testing.assert_allclose(in_site.to_ground(point_px)[0], on_plane.to_ground(point_px)[0] @ turned.T, rtol=1e-9)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_marker_that_lies_on_the_slope_agrees_with_the_survey(seed: int) -> None:
+    site, xy_m, camera = (
+        sloping_site(seed, slope_deg=10.0),
+        places_m(seed, 6),
+        sloping_site(seed, slope_deg=0.0).view.camera,
+    )
+    stated = MarkerPlace.lying(7, 1.6, xy_m=(-0.5, 0.5), heading_deg=20.0 * seed)
+    light = np.full((SIZE_PX[1], SIZE_PX[0]), 0.3)
+    draw_marker(light, marker_pattern("apriltag36h11", 7), site.view.project(_lying_m(stated, site)))
+    picture = through_camera(light, Hardship("clean", noise=1.0), np.random.default_rng(seed))
+    ground = FusedGround(
+        markers=MarkerObserver([stated]), survey=surveyed(site, xy_m, camera=camera),
+        camera=CameraPrior.calibrated(camera), params=FusedParams(sizes=False),
+    )  # fmt: skip
+    result = ground.update(frame(picture), Detections.empty(), STILL)
+    assert isinstance(result, GroundMap) and not ground.description["warnings"]
+    assert worst_m(result, site, places_m(seed + 50, 8, half_m=4.0)) < 0.05
+    alone = carried(surveyed(site, xy_m, camera=camera), camera)
+    assert np.trace(_middle_covariance(result)) < np.trace(_middle_covariance(alone))
+
+
+def _lying_m(place: MarkerPlace, site: SlopingSite) -> FloatArray:
+    """Return (4, 3) the corners of a marker on the slope, its first one and its first side where they are stated."""
+    first_m, side_m = place.corners_m[0, :2], place.corners_m[1, :2] - place.corners_m[0, :2]
+    along = np.append(side_m, side_m @ site.rise)
+    along /= np.linalg.norm(along)
+    across = np.cross([-site.rise[0], -site.rise[1], 1.0] / np.sqrt(1.0 + site.rise @ site.rise), along)
+    start_m = np.append(first_m, 102.0 + first_m @ site.rise)
+    steps = place.size_m * np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    corners_m: FloatArray = start_m + steps[:, :1] * along + steps[:, 1:] * across
+    return corners_m
+
+
+def _middle_covariance(ground: GroundMap) -> FloatArray:
+    by_map = map_jacobian(ground, ground.undistorted(np.array([[640.0, 400.0]])))[0]
+    return np.asarray(by_map @ ground.covariance @ by_map.T)
+
+
+def test_what_knows_level_ground_only_is_not_asked_on_a_slope() -> None:
+    told = {}
+    for slope_deg in (0.0, 10.0):
+        site, xy_m = sloping_site(9, slope_deg=slope_deg), places_m(9, 6)
+        camera = site.view.camera
+        survey = SurveyedGround(
+            site.seen_px(xy_m), xy_m, SIZE_PX, heights_m=site.heights_m(xy_m), camera=camera, time_s=10.0
+        )
+        ground = FusedGround(survey=survey, camera=CameraPrior.calibrated(camera))
+        readings = replace(blank_frame(*SIZE_PX), telemetry=READINGS)
+        told[slope_deg] = ground.update(readings, Detections.empty(), STILL)
+    assert isinstance(told[0.0], GroundMap) and isinstance(told[10.0], NoGroundMap)
