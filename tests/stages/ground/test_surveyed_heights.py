@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from drawn_ground import frame
+from drawn_solid import motion_between
 from sloping_site import SlopingSite, places_m, sloping_site
 from stages.ground.test_surveyed import STILL, blank_frame, refusal, updated
 from tolerances import GROUND_THROUGH_LENS_M, OFF_PLANE_M, RELIEF_COVERAGE
@@ -16,6 +17,7 @@ from standoff.core.camera import Camera, CameraPrior
 from standoff.core.errors import GroundError
 from standoff.core.homography import FloatArray
 from standoff.core.map_error import map_jacobian
+from standoff.core.pose import View
 from standoff.core.telemetry import Telemetry
 from standoff.core.types import Detections, GroundMap, NoGroundMap
 from standoff.evaluation.drawn_markers import Hardship, draw_marker, through_camera
@@ -273,6 +275,29 @@ def _lying_m(place: MarkerPlace, site: SlopingSite) -> FloatArray:
 def _middle_covariance(ground: GroundMap) -> FloatArray:
     by_map = map_jacobian(ground, ground.undistorted(np.array([[640.0, 400.0]])))[0]
     return np.asarray(by_map @ ground.covariance @ by_map.T)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_motion_of_the_picture_carries_the_map_over_a_slope(seed: int) -> None:
+    site, xy_m = sloping_site(seed, slope_deg=12.0), places_m(seed, 6)
+    survey = surveyed(site, xy_m, camera=site.view.camera)
+    assert survey.plane is not None
+    to_plane = survey.plane.plane_to_site.T
+    ground = FusedGround(survey=survey, camera=CameraPrior.calibrated(site.view.camera))
+    views, times_s = [site.view], np.arange(5) / 5.0
+    for k, time_s in enumerate(times_s.tolist()):
+        views.append(views[0].changed(np.array([0.01, 0.03, -0.02, 0.8, -0.3, 0.4, 0.0, 0.0]) * k))
+        above = [_on_plane(one, to_plane) for one in views]
+        motion = STILL if k == 0 else motion_between(above[0], above[-1], 0.0)
+        shown = replace(blank_frame(*SIZE_PX, index=k), time_s=time_s)
+        result = ground.update(shown, Detections.empty(), motion)
+        assert isinstance(result, GroundMap), result
+        assert worst_m(result, replace(site, view=views[-1]), places_m(seed + 50, 8, half_m=4.0)) < 0.02
+
+
+def _on_plane(view: View, to_plane: FloatArray) -> View:
+    """Return a view in the frame of a plane that is turned and 102 m up."""
+    return View(view.camera, to_plane @ (view.position_m - [0.0, 0.0, 102.0]), view.site_to_camera @ to_plane.T)
 
 
 def test_what_knows_level_ground_only_is_not_asked_on_a_slope() -> None:

@@ -87,11 +87,12 @@ class SurveyedGround:
         ideal_px = _undistorted(seen_px, camera, names)
         self.points_m, self.time_s, self.origin = surveyed_m, time_s, origin
         self.plane = _plane(surveyed_m, heights_m, names)
-        on_plane_px, laid = ideal_px, True
+        warnings: list[str] = []
         if self.plane is not None:
             prior = CameraPrior.unknown(*image_size_px) if camera is None else CameraPrior.calibrated(camera)
-            on_plane_px, laid = laid_on_plane(self.plane, seen_px, ideal_px, surveyed_m, prior)
-        self.fit = fit_survey(on_plane_px, surveyed_m, names, point_sigma_px)
+            ideal_px, laid = laid_on_plane(self.plane, seen_px, ideal_px, surveyed_m, prior)
+            warnings = self.plane.warnings + ([] if laid else [NOT_LAID])
+        self.fit = fit_survey(ideal_px, surveyed_m, names, point_sigma_px)
         self._surveyed = GroundMap(
             image_to_ground=self.fit.image_to_ground,
             covariance=self.fit.covariance,
@@ -107,10 +108,10 @@ class SurveyedGround:
         self._current: GroundMap | NoGroundMap = self._surveyed
         self._current_size_px = image_size_px
         self.description = _describe(self.fit, self._surveyed, names, point_sigma_px)
+        self.description["warnings"] += warnings
         if self.plane is not None:
             self.description["heights"] = self.plane.description
             self.description["basis"] += f"; {self.plane.text}"
-            self.description["warnings"] += self.plane.warnings + ([] if laid else [NOT_LAID])
 
     @property
     def is_mirrored(self) -> bool:
