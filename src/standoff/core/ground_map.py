@@ -9,6 +9,7 @@ import numpy as np
 from standoff.core import homography
 from standoff.core.camera import Camera
 from standoff.core.homography import BoolArray, FloatArray
+from standoff.core.relief import Relief
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,6 +48,7 @@ class GroundMap:
             counted from elsewhere, and those of different frames cannot be compared.
         frame_stated: Whether somebody stated where the site frame lies (surveyed points, markers, a reference whose
             first corner is told), so that places of a plan can be found in it.
+        relief: How far the ground lies off the map's plane, where its heights were surveyed; None: nobody did.
     """
 
     image_to_ground: FloatArray
@@ -60,6 +62,7 @@ class GroundMap:
     age_s: float = 0.0
     site_frame: int = 0
     frame_stated: bool = False
+    relief: Relief | None = None
 
     def __post_init__(self) -> None:
         covariance = np.zeros((10, 10))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from standoff.stages.ground.camera_belief import STATED, CameraBelief, Moment
 from standoff.stages.ground.last_resorts import LastResorts
 from standoff.stages.ground.marker_observer import MarkerObserver
 from standoff.stages.ground.params import FusedParams
+from standoff.stages.ground.plane_frame import LEVEL_DEG, laid_marker, laid_reference, map_in_site
 from standoff.stages.ground.point_landmarks import PointLandmarks
 from standoff.stages.ground.pose_filter import Estimate
 from standoff.stages.ground.pose_map import map_from_view, middle_scale_m_per_px
@@ -50,7 +51,8 @@ class FusedGround(protocols.Ground):
     Args:
         references: Reference objects, the most important one first.
         markers: What watches for printed markers; None: there are none.
-        survey: Points read from one picture of this camera, which may move; None: there are none.
+        survey: Points read from one picture of this camera, which may move; None: there are none. Where its heights
+            are of ground that slopes, telemetry and sizes, which know level ground only, are not asked.
         camera: What is known of the camera; None: a drone's usual lens.
         params: Settings.
         remember: Whether frames know of those before them; False takes each by itself.
@@ -70,8 +72,14 @@ class FusedGround(protocols.Ground):
         params: FusedParams | None = None,
         remember: bool = True,
     ) -> None:
-        self._given_references = tuple(references)
         self._params = params if params is not None else FusedParams()
+        self._plane = None if survey is None else survey.plane
+        if self._plane is not None:
+            references = [laid_reference(one, self._plane) for one in references]
+            markers = None if markers is None else markers.at([laid_marker(p, self._plane) for p in markers.places])
+            if self._plane.slope_deg > LEVEL_DEG:
+                self._params = replace(self._params, telemetry=False, sizes=False)
+        self._given_references = tuple(references)
         self._given_camera = camera
         self._remember = remember
         telemetry = self._params.telemetry
@@ -79,10 +87,10 @@ class FusedGround(protocols.Ground):
         self._markers, self._survey = markers, None if survey is None else SurveyObserver(survey)
         self._survey_points = self._marker_points = None
         if self._survey is not None:
-            self._survey_points = PointLandmarks.of_survey(self._survey, telemetry=telemetry)
+            self._survey_points = PointLandmarks.of_survey(self._survey, telemetry=telemetry, up=self._up)
         if markers is not None:
             alone = not references and survey is None
-            self._marker_points = PointLandmarks.of_markers(markers, alone=alone, telemetry=telemetry)
+            self._marker_points = PointLandmarks.of_markers(markers, alone=alone, telemetry=telemetry, up=self._up)
         self._size_px: tuple[int, int] | None = None
         self._camera: CameraPrior | None = None
         self._begin_stream(None)
@@ -125,6 +133,11 @@ class FusedGround(protocols.Ground):
             "lens_distortion_removed": True,
             "warnings": [*self._survey_warnings, *self._references.never_seen, *self._belief.warnings.values()],
         }
+
+    @property
+    def _up(self) -> FloatArray:
+        """(3,) where the vertical points in the frame in which the ground is z = 0."""
+        return np.array([0.0, 0.0, 1.0]) if self._plane is None else self._plane.plane_to_site[2]
 
     @property
     def _survey_warnings(self) -> list[str]:
@@ -227,7 +240,7 @@ class FusedGround(protocols.Ground):
             return NoGroundMap(UNSURE if keeper is not None else f"{NOT_SURE}; {HELP}")
         self._tally.count(source, belief.length_sigma)
         size_sigma, middle_m = self._measured_by(keeper)
-        return map_from_view(
+        ground = map_from_view(
             now.state.view,
             now.total[:CHANGES, :CHANGES],
             method=self._method if keeper is not None else source,
@@ -239,6 +252,7 @@ class FusedGround(protocols.Ground):
             site_frame=belief.site_frame,
             frame_stated=belief.frame_of == STATED and self._references.corners_told,
         )
+        return map_in_site(ground, self._plane) if self._plane is not None and belief.frame_of == STATED else ground
 
     def _measured_by(self, keeper: SolidObserver | None) -> tuple[float, FloatArray | None]:
         """Return the relative error of the lengths that all others come from, and (2,) the place that it leaves."""

@@ -146,7 +146,7 @@ def _starts(seen: PointObservation, camera: Camera) -> list[View]:
     if not np.isfinite(pinhole_px).all():
         return []
     count, turns, shifts, _ = cv2.solvePnPGeneric(
-        seen.points_m, pinhole_px, camera.matrix, None, flags=cv2.SOLVEPNP_IPPE
+        _flattened(seen.points_m), pinhole_px, camera.matrix, None, flags=cv2.SOLVEPNP_IPPE
     )
     views = []
     for turn, shift in zip(turns[:count], shifts[:count], strict=True):
@@ -155,6 +155,14 @@ def _starts(seen: PointObservation, camera: Camera) -> list[View]:
         if np.isfinite(position_m).all():
             views.append(View(camera, position_m, rotation))
     return views
+
+
+def _flattened(points_m: FloatArray) -> FloatArray:
+    """Return (N, 3) points moved onto the plane that is nearest to them: a start need not know of the relief."""
+    middle_m = points_m.mean(axis=0)
+    normal = np.linalg.svd(points_m - middle_m)[2][2]
+    flat: FloatArray = points_m - ((points_m - middle_m) @ normal)[:, None] * normal
+    return flat
 
 
 def _rows(

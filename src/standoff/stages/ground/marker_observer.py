@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Self
 
 import numpy as np
 
@@ -55,6 +56,10 @@ class MarkerObserver:
     def places(self) -> tuple[MarkerPlace, ...]:
         """Which markers lie where."""
         return tuple(self._places.values())
+
+    def at(self, places: Sequence[MarkerPlace]) -> Self:
+        """Return the same watch over markers that lie elsewhere."""
+        return type(self)(places, self._family)
 
     def reset(self) -> None:
         """Forget where markers were seen: another film begins."""

@@ -8,6 +8,7 @@ from typing import Self
 
 import numpy as np
 
+from standoff.core.homography import FloatArray
 from standoff.core.pose import CHANGES, View
 from standoff.core.types import NoGroundMap
 from standoff.stages.ground.camera_belief import STATED, CameraBelief, Moment, Source
@@ -55,36 +56,38 @@ class PointLandmarks:
         watch: Finds them.
         source: What they are.
         telemetry: Whether the drone's telemetry may help a first look.
+        up: (3,) where the vertical points in the frame of the points, in which the ground is z = 0.
     """
 
-    def __init__(self, watch: Watch, source: PointSource, *, telemetry: bool) -> None:
-        self._watch = watch
+    def __init__(self, watch: Watch, source: PointSource, *, telemetry: bool, up: FloatArray) -> None:
+        self._watch, self._up = watch, up
         self._source = source
         self._telemetry = telemetry
         self.reset()
 
     @classmethod
-    def of_markers(cls, observer: MarkerObserver, *, alone: bool, telemetry: bool) -> Self:
+    def of_markers(cls, observer: MarkerObserver, *, alone: bool, telemetry: bool, up: FloatArray) -> Self:
         """Watch for printed markers.
 
         Args:
             observer: Finds them.
             alone: Whether nothing else has a stated place.
             telemetry: Whether the drone's telemetry may help a first look.
+            up: (3,) where the vertical points.
         """
 
         def watch(moment: Moment, view: View | None) -> Sequence[PointObservation] | NoGroundMap:
             return observer.observe(moment.gray, view, moment.frame.time_s) or NoGroundMap(NO_MARKER)
 
         place_sigma_m = 0.0 if alone and len(observer.places) == 1 else _TAPE_SIGMA_M
-        return cls(watch, PointSource("markers", place_sigma_m, patience_s=1.0), telemetry=telemetry)
+        return cls(watch, PointSource("markers", place_sigma_m, patience_s=1.0), telemetry=telemetry, up=up)
 
     @classmethod
-    def of_survey(cls, observer: SurveyObserver, *, telemetry: bool) -> Self:
+    def of_survey(cls, observer: SurveyObserver, *, telemetry: bool, up: FloatArray) -> Self:
         """Wait for the picture of a survey."""
         # The survey's own error is part of its points' errors in the picture.
         source = PointSource("survey", place_sigma_m=0.0, patience_s=0.0)
-        return cls(lambda moment, _: observer.observe(moment), source, telemetry=telemetry)
+        return cls(lambda moment, _: observer.observe(moment), source, telemetry=telemetry, up=up)
 
     def reset(self) -> None:
         """Forget everything that the pictures have told."""
@@ -153,7 +156,7 @@ class PointLandmarks:
             read = telemetry_view(telemetry, telemetry, belief.lens, frame_is_free=True)
             if not isinstance(read, NoGroundMap):
                 return telemetry_prior(*read)
-        return level_prior(belief.lens)
+        return level_prior(belief.lens, self._up)
 
     def _warn(self, seen: Sequence[PointObservation], moment: Moment, belief: CameraBelief) -> None:
         names = " and ".join(one.name for one in seen)

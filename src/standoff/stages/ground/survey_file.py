@@ -2,13 +2,16 @@
 
     image_size_px: [768, 576]          # of the picture that the points were read from
     points:                            # four or more, not on a line, spread over the ground that matters
-      - {name: kerb, px: [412.0, 310.5], m: [0.0, 0.0]}
+      - {name: kerb, px: [412.0, 310.5], m: [0.0, 0.0], z_m: 102.31}   # z_m: optional height
       - {name: manhole, px: [120.0, 400.0], m: [-4.2, 3.1]}
       - ...
     camera: camera.yaml                # optional: removes lens distortion; relative to this file
     area_px: [[0, 200], [767, 200], [767, 575], [0, 575]]   # optional: where the map is to be trusted
     point_sigma_px: 1.0                # optional: how well a point was read, one coordinate
     time_s: 0.0                        # where the camera moves: when the picture was taken, by the film's clock
+
+Where three or more points that are not on a line have a height `z_m`, metres upwards from any level, the ground is the
+plane through these heights, sloping as it may; distances stay horizontal.
 
 A point has either `m`, or `lonlat: [8.543210, 50.123456]`: degrees of longitude and latitude (WGS 84), which become
 metres east and north of the first point.
@@ -67,6 +70,7 @@ def load_survey(path: Path | str, *, camera: Camera | None = None) -> SurveyedGr
         [numbers(point.get("px"), (2,), f"px of {name!r} in {path}") for name, point in points.items()],
         points_m,
         (int(width_px), int(height_px)),
+        heights_m=_heights_m(points, path),
         names=tuple(points),
         camera=camera,
         area_px=area_px,
@@ -111,6 +115,15 @@ def _points_m(points: Mapping[str, Mapping[str, Any]], path: Path) -> tuple[Floa
     return places, None
 
 
+def _heights_m(points: Mapping[str, Mapping[str, Any]], path: Path) -> FloatArray:
+    """Return (N,) the points' heights, NaN where there is none."""
+    heights = [
+        float(numbers(point["z_m"], (), f"z_m of {name!r} in {path}")) if "z_m" in point else np.nan
+        for name, point in points.items()
+    ]
+    return np.array(heights, dtype=np.float64)
+
+
 def _points(content: Mapping[str, Any], path: Path) -> dict[str, Mapping[str, Any]]:
     rows = content.get("points")
     if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
@@ -119,7 +132,7 @@ def _points(content: Mapping[str, Any], path: Path) -> dict[str, Mapping[str, An
     points: dict[str, Mapping[str, Any]] = {}
     for number, row in enumerate(rows, start=1):
         name = str(row.get("name", f"point {number}"))
-        check_keys(row, ("name", "px", "m", "lonlat"), f"{name!r} in {path}")
+        check_keys(row, ("name", "px", "m", "lonlat", "z_m"), f"{name!r} in {path}")
         if name in points:
             raise GroundError(expected="distinct names", found=f"{name!r} twice in {path}", fix="rename one")
         points[name] = row

@@ -59,5 +59,5 @@ class SurveyObserver:
             self.missed = f"{MISSED}: it is at {wanted_s:g} s, the next one at {time_s:.2f} s"
             return NoGroundMap(self.missed)
         points_px, sigma_px = self.survey.points_in(moment.frame.size_px)
-        points_m = np.column_stack([self.survey.points_m, np.zeros(len(points_px))])
+        points_m = self.survey.points_in_plane()
         return [PointObservation(SURVEYED, points_m, points_px, np.full(len(points_px), sigma_px))]

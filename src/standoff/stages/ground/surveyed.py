@@ -10,11 +10,12 @@ import numpy as np
 import numpy.typing as npt
 
 from standoff.core import homography, protocols
-from standoff.core.camera import Camera
+from standoff.core.camera import Camera, CameraPrior
 from standoff.core.errors import GroundError
 from standoff.core.geographic import GeographicOrigin
 from standoff.core.homography import FloatArray
 from standoff.core.types import CameraMotion, Detections, Frame, GroundMap, NoCameraMotion, NoGroundMap
+from standoff.stages.ground.height_plane import NOT_LAID, HeightPlane, fit_heights, laid_on_plane
 from standoff.stages.ground.survey_fit import SurveyFit, fit_survey
 
 # Two normal coordinates reach it once in 50,000 points.
@@ -36,6 +37,8 @@ class SurveyedGround(protocols.Ground):
         points_px: (N, 2) points as seen in the picture, N >= 4; the centre of the top-left pixel is (0, 0).
         points_m: (N, 2) their positions, x east and y north or any other right-handed axes seen from above.
         image_size_px: (width, height) of the picture that the points were read from.
+        heights_m: (N,) their heights, upwards from any level, NaN where none was measured: the ground is the plane
+            through them. Empty: no height is known, and the points are taken to lie on one plane.
         names: N names for messages; left out: "point 1" and so on.
         camera: The lens, if its distortion is to be removed.
         area_px: (V, 2) polygon as seen in the picture outside which the map is not trusted, for example where
@@ -47,6 +50,7 @@ class SurveyedGround(protocols.Ground):
 
     Attributes:
         points_m: (N, 2) as given.
+        plane: Through the heights; None: there are none.
         time_s: As given.
         origin: As given.
         fit: Residuals and covariance.
@@ -62,6 +66,7 @@ class SurveyedGround(protocols.Ground):
         points_m: npt.ArrayLike,
         image_size_px: tuple[int, int],
         *,
+        heights_m: npt.ArrayLike = (),
         names: Sequence[str] = (),
         camera: Camera | None = None,
         area_px: npt.ArrayLike = (),
@@ -81,6 +86,12 @@ class SurveyedGround(protocols.Ground):
         camera = None if camera is None else _fitting_camera(camera, image_size_px)
         ideal_px = _undistorted(seen_px, camera, names)
         self.points_m, self.time_s, self.origin = surveyed_m, time_s, origin
+        self.plane = _plane(surveyed_m, heights_m, names)
+        warnings: list[str] = []
+        if self.plane is not None:
+            prior = CameraPrior.unknown(*image_size_px) if camera is None else CameraPrior.calibrated(camera)
+            ideal_px, laid = laid_on_plane(self.plane, seen_px, ideal_px, surveyed_m, prior)
+            warnings = self.plane.warnings + ([] if laid else [NOT_LAID])
         self.fit = fit_survey(ideal_px, surveyed_m, names, point_sigma_px)
         self._surveyed = GroundMap(
             image_to_ground=self.fit.image_to_ground,
@@ -92,10 +103,15 @@ class SurveyedGround(protocols.Ground):
             anchors_px=seen_px,
             camera=camera,
             frame_stated=True,
+            relief=None if self.plane is None else self.plane.relief,
         )
         self._current: GroundMap | NoGroundMap = self._surveyed
         self._current_size_px = image_size_px
         self._description = _describe(self.fit, self._surveyed, names, point_sigma_px)
+        self._description["warnings"] += warnings
+        if self.plane is not None:
+            self._description["heights"] = self.plane.description
+            self._description["basis"] += f"; {self.plane.text}"
 
     @property
     def description(self) -> dict[str, Any]:
@@ -124,6 +140,12 @@ class SurveyedGround(protocols.Ground):
             GroundError: The picture has not the survey's shape.
         """
         return self._in(size_px).anchors_px, self.fit.sigma_px * size_px[0] / self._surveyed.image_size_px[0]
+
+    def points_in_plane(self) -> FloatArray:
+        """Return (N, 3) the points in the frame in which the ground is z = 0: the plane's, or else the site's."""
+        if self.plane is None:
+            return np.column_stack([self.points_m, np.zeros(len(self.points_m))])
+        return self.plane.in_plane(self.points_m, self.plane.off_m)
 
     def prepare(self, size_px: tuple[int, int]) -> None:
         """Make sure that pictures of a size (width, height) have the survey's shape, before the first frame.
@@ -175,6 +197,14 @@ def _pairs(points_px: npt.ArrayLike, points_m: npt.ArrayLike) -> tuple[FloatArra
     if len(seen_px) < 4:
         raise GroundError(expected=expected, found=f"{len(seen_px)}", fix="survey more points")
     return seen_px, surveyed_m
+
+
+def _plane(points_m: FloatArray, heights_m: npt.ArrayLike, names: Sequence[str]) -> HeightPlane | None:
+    heights = np.array(heights_m, dtype=np.float64)
+    if heights.size and heights.shape != (len(points_m),):
+        found = f"an array of shape {heights.shape} for {len(points_m)} points"
+        raise GroundError(expected="one height (z_m) a point, NaN for none", found=found, fix="correct the heights")
+    return None if np.isnan(heights).all() else fit_heights(points_m, heights, names)
 
 
 def _check_inside(points_px: FloatArray, image_size_px: tuple[int, int], names: Sequence[str]) -> None:

@@ -29,6 +29,7 @@ _LEVEL_SIGMA = np.sin(np.deg2rad(3.0))
 """A gimbal, and whoever sets up a camera, keeps the picture's lower edge level."""
 
 _FREE_DEG, _FREE_M = 1e3, 1e4
+_UP = np.array([0.0, 0.0, 1.0])
 _TERRAIN_M = 1.0
 """Standard error of the ground's height below the drone against that of the point of take-off."""
 
@@ -97,17 +98,22 @@ def telemetry_prior(telemetry: View, covariance: FloatArray) -> PriorRows:
     return rows
 
 
-def level_prior(prior: CameraPrior) -> PriorRows:
-    """Return the rows of a camera of which only the lens is known, and that its picture is level."""
+def level_prior(prior: CameraPrior, up: FloatArray = _UP) -> PriorRows:
+    """Return the rows of a camera of which only the lens is known, and that its picture is level.
+
+    Args:
+        prior: The lens.
+        up: (3,) where the vertical points in the frame of the view.
+    """
     wanted = prior.camera
 
     def rows(now: View) -> tuple[FloatArray, FloatArray]:
-        axes = now.site_to_camera
+        upwards = now.site_to_camera @ up
         focal = np.log(now.camera.matrix[0, 0] / wanted.matrix[0, 0]) / prior.focal_sigma
         k1 = (now.camera.distortion[0] - wanted.distortion[0]) / prior.k1_sigma
         by_change = np.zeros((3, CHANGES))
-        by_change[0, :3] = np.array([0.0, axes[2, 2], -axes[1, 2]]) / _LEVEL_SIGMA
+        by_change[0, :3] = np.array([0.0, upwards[2], -upwards[1]]) / _LEVEL_SIGMA
         by_change[1, 6], by_change[2, 7] = 1.0 / prior.focal_sigma, 1.0 / prior.k1_sigma
-        return np.array([axes[0, 2] / _LEVEL_SIGMA, focal, k1]), by_change
+        return np.array([upwards[0] / _LEVEL_SIGMA, focal, k1]), by_change
 
     return rows

@@ -62,7 +62,10 @@ class LocateParams:
     relief_sigma_m: Annotated[
         float,
         Ge(0),
-        Doc("Standard deviation of the ground's height about the plane of the map, where things stand."),
+        Doc(
+            "Standard deviation of the ground's height about the plane of the map, where things stand. Surveyed "
+            "heights take its place."
+        ),
     ] = 0.1
     cut_off_margin_px: Annotated[
         float,

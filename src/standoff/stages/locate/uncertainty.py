@@ -52,7 +52,7 @@ def horizon_margin(
     return margin
 
 
-def relief_covariance(ground: GroundMap, undistorted_px: FloatArray, height_sigma_m: float) -> FloatArray:
+def relief_covariance(ground: GroundMap, undistorted_px: FloatArray, usual_sigma_m: float) -> FloatArray:
     """Return what ground that lies higher or lower than the map's plane does to a place: it moves along the view.
 
     The angle of the view is taken from the map alone, which is exact in the middle of the picture; towards its edges
@@ -61,7 +61,7 @@ def relief_covariance(ground: GroundMap, undistorted_px: FloatArray, height_sigm
     Args:
         ground: The map.
         undistorted_px: (N, 2) the points without lens distortion.
-        height_sigma_m: Standard deviation of the ground's height.
+        usual_sigma_m: Standard deviation of the ground's height, where nobody surveyed heights.
 
     Returns:
         (N, 2, 2) metres squared; NaN where the point is.
@@ -69,9 +69,12 @@ def relief_covariance(ground: GroundMap, undistorted_px: FloatArray, height_sigm
     covariance: FloatArray = np.full((len(undistorted_px), 2, 2), np.nan)
     jacobian = homography.point_jacobian(ground.image_to_ground, undistorted_px)
     usable = np.isfinite(jacobian).all(axis=(1, 2))
+    height_sigma_m = np.full(len(undistorted_px), usual_sigma_m)
+    if ground.relief is not None:
+        height_sigma_m = ground.relief.sigma_at(homography.apply(ground.image_to_ground, undistorted_px)[0])
     # A pixel covers most ground along the view, and least across it, by the sine of the angle at which it is seen.
     directions, extents, _ = np.linalg.svd(jacobian[usable])
     sine = extents[:, 1] / extents[:, 0]
-    along = directions[:, :, 0] * (height_sigma_m * np.sqrt(1.0 - sine**2) / sine)[:, None]
+    along = directions[:, :, 0] * (height_sigma_m[usable] * np.sqrt(1.0 - sine**2) / sine)[:, None]
     covariance[usable] = along[:, :, None] * along[:, None, :]
     return covariance
