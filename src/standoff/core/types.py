@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
-from typing import Any, ClassVar, Literal, Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -24,8 +24,9 @@ from standoff.core.hazards import Severity as Severity
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.motions import CameraMotion as CameraMotion
 from standoff.core.motions import NoCameraMotion as NoCameraMotion
+from standoff.core.outcome import Outcome as Outcome
+from standoff.core.outcome import Silence as Silence
 from standoff.core.rows import Columns, Rows
-from standoff.core.run_counts import RunCounts as RunCounts
 from standoff.core.telemetry import Telemetry
 from standoff.core.watched_ground import WatchedGround as WatchedGround
 
@@ -359,45 +360,3 @@ class FrameResult:
     unfollowed: BoolArray = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
     watched: WatchedGround = field(default_factory=WatchedGround)
     open_hazards: OpenHazards = field(default_factory=OpenHazards)
-
-
-@dataclass(frozen=True, slots=True)
-class Silence:
-    """A moment at which a stream should have told something and did not: nothing that was true before is known now.
-
-    Attributes:
-        stream_id: Name of the stream.
-        time_s: When, in presentation time.
-        reason: Why nothing arrives.
-        hazards: The events of this moment.
-        open_hazards: Which hazards are open after them.
-    """
-
-    stream_id: str
-    time_s: float
-    reason: str
-    hazards: tuple[Hazard, ...]
-    open_hazards: OpenHazards
-
-
-@dataclass(frozen=True, slots=True)
-class Outcome:
-    """How a run ended; sinks are closed with it.
-
-    Attributes:
-        status: "complete"; "interrupted" by the operator; "failed" with the source, the model or a stage; a stream that
-            was lost has failed.
-        message: One line; empty when complete.
-        hazards: The last events of the hazards that were open when the stream ended: closed, or unknown where it
-            failed.
-        sink_errors: Message of each sink that gave up during the run, by sink name.
-        counts: What happened in it.
-        about: What its source and stages say of themselves at the end, by heading; `warnings` among them.
-    """
-
-    status: Literal["complete", "interrupted", "failed"]
-    message: str = ""
-    hazards: tuple[Hazard, ...] = ()
-    sink_errors: Mapping[str, str] = field(default_factory=dict)
-    counts: RunCounts = field(default_factory=RunCounts)
-    about: Mapping[str, Any] = field(default_factory=dict)
