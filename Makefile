@@ -41,9 +41,9 @@ setup: $(READY)
 
 # The lock fixes every version; the test oracles come without their dependencies, because those would
 # bring a second OpenCV that overwrites the headless one.
-$(READY): pyproject.toml requirements.lock requirements-oracles.txt
+$(READY): pyproject.toml simulator/pyproject.toml requirements.lock requirements-oracles.txt
 	$(call empty_venv,$(VENV))
-	$(BIN)/python -m pip install --quiet --constraint requirements.lock --editable '.[dev,train,sim]'
+	$(BIN)/python -m pip install --quiet --constraint requirements.lock --editable '.[dev,train]' --editable ./simulator
 	$(BIN)/python -m pip install --quiet --no-deps --requirement requirements-oracles.txt
 	@touch $@
 
@@ -134,7 +134,7 @@ demo-pets: $(READY)
 lock: $(READY)
 	$(BIN)/python -m pip install --quiet pip-tools
 	$(BIN)/pip-compile --quiet --upgrade --all-extras --strip-extras --no-header --no-annotate --no-emit-index-url \
-	  --no-emit-find-links --no-emit-trusted-host --output-file requirements.lock pyproject.toml
+	  --no-emit-find-links --no-emit-trusted-host --output-file requirements.lock pyproject.toml simulator/pyproject.toml
 	sed -i 's/+cpu$$//' requirements.lock
 
 clean:

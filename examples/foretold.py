@@ -20,14 +20,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from standoff_sim.movement.motion import sample
+from standoff_sim.people.anthropometry import MEAN_STATURE_M
+from standoff_sim.scene.casting import CASTS, Stage
 
 from standoff.core.classes import CLASSES
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.roles import IS_EQUIPMENT
 from standoff.core.types import GroundMap, Hazard, IntArray, Proximities, Tracks
-from standoff.simulation.casting import CASTS, Stage
-from standoff.simulation.motion import sample
-from standoff.simulation.people.anthropometry import MEAN_STATURE_M
 from standoff.stages.hazard import HazardMonitor, HazardParams
 from standoff.stages.locate import Locator
 from standoff.stages.proximity import Excuses, ProximityMeter, ProximityParams

@@ -15,14 +15,14 @@ import argparse
 from dataclasses import dataclass
 
 import numpy as np
+from standoff_sim.ground.terrain import Terrain, make_terrain
+from standoff_sim.ground.terrain_plan import TerrainPlan
 
 from standoff.core.camera import Camera, CameraPrior
 from standoff.core.errors import GroundError
 from standoff.core.homography import FloatArray
 from standoff.core.pose import View
 from standoff.core.types import CameraMotion, Detections, Frame, GroundMap, NoCameraMotion, Tracks
-from standoff.simulation.terrain import Terrain, make_terrain
-from standoff.simulation.terrain_plan import TerrainPlan
 from standoff.stages.frames.pictures import ArrayPicture
 from standoff.stages.ground import FusedGround, FusedParams, SurveyedGround
 from standoff.stages.locate import Locator

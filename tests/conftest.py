@@ -35,7 +35,7 @@ def shared_data() -> Path:
 @pytest.fixture(scope="session")
 def opengl() -> None:
     """Skip where there is no OpenGL, except where CI says that there must be."""
-    from standoff.simulation.render import Renderer
+    from standoff_sim.render import Renderer
 
     try:
         with Renderer((64, 64)):

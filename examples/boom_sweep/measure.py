@@ -3,7 +3,7 @@
 python examples/boom_sweep/measure.py [--machines 20] [--seed 0]
 
 Each machine of the simulator digs or grades for half a minute, seen five times a second by a camera 14 to 50 m up that
-looks down 28 to 75 degrees. Its boxes have the errors of the shipped detector (`standoff.simulation.detection_noise`),
+looks down 28 to 75 degrees. Its boxes have the errors of the shipped detector (`standoff_sim.clip.detection_noise`),
 its ground points are 0.67 m off in each coordinate, three tenths of the variance for half a second and the rest for
 good. Eight workers stand about it, beyond the counterweight and inside both action radii (14.1 m). The stage locate
 places them; `boom.py` tells the direction, `sweep.py` who is excused, for each look-ahead: by that direction, and by
@@ -21,6 +21,12 @@ from itertools import product
 
 import numpy as np
 from boom import Booms
+from standoff_sim.behaviour.digging import digging, grading
+from standoff_sim.clip.detection_noise import MEMORY_S, NOISE
+from standoff_sim.clip.truth import full_box_px
+from standoff_sim.machines.excavator import make_excavator
+from standoff_sim.movement.motion import Place, sample
+from standoff_sim.scene.scene import moved
 from sweep import out_of_sweep
 
 from standoff.core.camera import Camera
@@ -28,12 +34,6 @@ from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.homography import FloatArray
 from standoff.core.pose import View
 from standoff.core.types import Tracks
-from standoff.simulation.behaviour.digging import digging, grading
-from standoff.simulation.detection_noise import MEMORY_S, NOISE
-from standoff.simulation.machines.excavator import make_excavator
-from standoff.simulation.motion import Place, sample
-from standoff.simulation.scene import moved
-from standoff.simulation.truth import full_box_px
 from standoff.stages.ground import map_from_view
 from standoff.stages.locate import Locator
 

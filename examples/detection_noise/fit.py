@@ -1,4 +1,4 @@
-"""Fit `standoff.simulation.detection_noise` to what a detector finds on rendered clips.
+"""Fit `standoff_sim.clip.detection_noise` to what a detector finds on rendered clips.
 
     python examples/detection_noise/fit.py CLIP ... [--model site]
 
@@ -20,12 +20,12 @@ import numpy.typing as npt
 import pyarrow.parquet as pq
 from scipy.optimize import minimize
 from scipy.special import logit
+from standoff_sim.clip.detection_noise import GROUPS, ClassNoise, size_of
 
 from standoff.core.boxes import areas_px2, shared_px2
 from standoff.core.classes import CLASSES
 from standoff.core.homography import FloatArray
 from standoff.core.types import Detections, Frame
-from standoff.simulation.detection_noise import GROUPS, ClassNoise, size_of
 from standoff.stages.detect import OnnxDetector, find_model
 from standoff.stages.frames import frame_from_array, open_source
 

@@ -251,15 +251,17 @@ def pack_plan(config: Path, pack: Pack, *, is_recipe: bool) -> dict[str, Any]:
 
 def pack_software(pack: Pack, folder: Path, arguments: argparse.Namespace) -> None:
     """Add standoff's wheel, the lock, what is to be installed, and on request its wheels."""
-    wheel = arguments.wheel or _build_wheel(folder)
-    pack.add_file(wheel.name, wheel, "standoff's wheel")
+    wheel = arguments.wheel or _build_wheel(ROOT, folder)
+    wheels = [wheel, *([_build_wheel(ROOT / "simulator", folder)] if arguments.recipe else [])]
+    for one in wheels:
+        pack.add_file(one.name, one, "standoff's wheel")
     lock = ROOT / "requirements.lock"
     pack.add_file(lock.name, lock, "the lock")
     extras = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["optional-dependencies"]
-    wanted = [*extras["train"], *(extras["sim"] if arguments.recipe else ())]
+    wanted = extras["train"]
     # The machine's own torch is built for its GPU: run.sh sees to it.
     own = [one for one in wanted if not one.startswith("torch")]
-    pack.texts["requirements.txt"] = "".join(f"{one}\n" for one in (f"./{wheel.name}", *own))
+    pack.texts["requirements.txt"] = "".join(f"{one}\n" for one in (*(f"./{wheel.name}" for wheel in wheels), *own))
     pack.add_file("run.sh", HERE / "run_packed.sh", "run.sh")
     if not arguments.wheels:
         return
@@ -269,15 +271,16 @@ def pack_software(pack: Pack, folder: Path, arguments: argparse.Namespace) -> No
     version = ["--python-version", arguments.python] if arguments.python else []
     # wheels of files that a dependency has as source only could not be installed without compilers
     _pip("download", "--dest", str(folder / "wheels"), "--only-binary=:all:", *version,
-         "--constraint", str(lock), str(wheel), *own, *more)  # fmt: skip
+         "--constraint", str(lock), *map(str, wheels), *own, *more)  # fmt: skip
     for path in _walk(folder / "wheels"):
-        if path.name != wheel.name:
+        if path.name not in [one.name for one in wheels]:
             pack.add_file(f"wheels/{path.name}", path, "a wheel")
 
 
-def _build_wheel(folder: Path) -> Path:
-    _pip("wheel", "--no-deps", "--wheel-dir", str(folder), str(ROOT))
-    return next(folder.glob("standoff-*.whl"))
+def _build_wheel(source: Path, folder: Path) -> Path:
+    before = set(folder.glob("*.whl"))
+    _pip("wheel", "--no-deps", "--wheel-dir", str(folder), str(source))
+    return (set(folder.glob("*.whl")) - before).pop()
 
 
 def _pip(*words: str) -> None:

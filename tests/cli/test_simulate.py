@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -7,9 +9,7 @@ import moderngl
 import pytest
 from cli.calling import Call
 from laws import few
-
-from standoff import simulation
-from standoff.simulation.presets import MAX_SEED, PRESETS
+from standoff_sim.clip.presets import MAX_SEED, PRESETS
 
 _CLIP = ("--frames", 1, "--size", "160x90", "--processes", 1)
 _SET = ("simulate", "dataset", "--images", 1, "--size", "160x90", "--processes", 1, "--seed", 24)
@@ -19,7 +19,7 @@ _SET = ("simulate", "dataset", "--images", 1, "--size", "160x90", "--processes",
 def bare_sites(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave out most of what lies about on a site: its making takes longest."""
     bare = {name: replace(preset, clutter=0.05) for name, preset in PRESETS.items()}
-    monkeypatch.setattr("standoff.simulation.presets.PRESETS", bare)
+    monkeypatch.setattr("standoff_sim.clip.presets.PRESETS", bare)
 
 
 def _is_one_line(text: str) -> bool:
@@ -62,14 +62,21 @@ def test_a_wrong_option_is_one_line_and_writes_nothing(call: Call, tmp_path: Pat
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("words", [("mobile", *_CLIP), _SET[1:]])
-def test_an_install_without_the_extra_is_told_so_in_one_line(
-    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: tuple[object, ...]
-) -> None:
-    monkeypatch.setattr(simulation, "find_spec", lambda name: None if name == "shapely" else object())
-    code, out, err = call("simulate", *words, "--out", tmp_path / "out")
-    assert code == 2 and out == "" and _is_one_line(err)
-    assert "no shapely" in err and "pip install 'standoff[sim]'" in err
+def test_an_install_without_the_simulator_is_told_so_in_one_line() -> None:
+    # In a process of its own: the verbs are joined when the command line is imported.
+    code = """
+import importlib.metadata, importlib.util
+joined, found = importlib.metadata.entry_points, importlib.util.find_spec
+importlib.metadata.entry_points = lambda **kind: () if kind.get("group") == "standoff.verbs" else joined(**kind)
+importlib.util.find_spec = lambda name, *more: None if name == "standoff_sim" else found(name, *more)
+import sys
+sys.argv = ["standoff", "simulate", "mobile", "--seed", "3"]
+from standoff.cli import main
+main()
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
+    assert "no package standoff-sim" in done.stderr and "pip install ./simulator" in done.stderr
 
 
 @pytest.mark.parametrize("words", [("mobile", *_CLIP), _SET[1:]])

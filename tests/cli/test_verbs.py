@@ -69,7 +69,7 @@ def test_doctor_is_content_with_an_installation_that_can_only_run() -> None:
     report = json.loads(done.stdout)
     (drawing,) = [row for row in report["findings"] if row["topic"] == "simulator"]
     assert report["healthy"] and not drawing["ok"]
-    assert "pip install 'standoff[sim]'" in drawing["fix"]
+    assert "pip install ./simulator" in drawing["fix"]
 
 
 def test_the_boards_give_the_papers_tables(call: Call, shared_data: Path, tmp_path: Path) -> None:

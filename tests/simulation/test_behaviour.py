@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 from laws import seeds
 from simulation.moving_models import MovingModel
-
-from standoff.simulation import behaviour
-from standoff.simulation.behaviour.digging import RATES_PS
-from standoff.simulation.behaviour.encounters import least_distance_m
-from standoff.simulation.behaviour.stances import ExcavatorArm
-from standoff.simulation.driving import MOBILITY
-from standoff.simulation.motion import STEP_S, Place, sample
-from standoff.simulation.scene import Motion
+from standoff_sim import behaviour
+from standoff_sim.behaviour.digging import RATES_PS
+from standoff_sim.behaviour.encounters import least_distance_m
+from standoff_sim.behaviour.stances import ExcavatorArm
+from standoff_sim.movement.driving import MOBILITY
+from standoff_sim.movement.motion import STEP_S, Place, sample
+from standoff_sim.scene.scene import Motion
 
 EXCAVATOR, LOADER, TRUCK = MovingModel("excavator"), MovingModel("wheel_loader"), MovingModel("dump_truck")
 ROLLER, DOZER, CAR, WORKER = (MovingModel(kind) for kind in ("roller", "dozer", "vehicle", "worker"))

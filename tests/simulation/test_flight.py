@@ -7,11 +7,7 @@ import cv2
 import numpy as np
 import pytest
 from laws import seeds
-from tolerances import GEOMETRY_REL
-
-from standoff.core.homography import apply
-from standoff.simulation.band_noise import BandNoise
-from standoff.simulation.flight import (
+from standoff_sim.camera.flight import (
     ShakenFlight,
     Still,
     blur_homography,
@@ -19,7 +15,11 @@ from standoff.simulation.flight import (
     look_at,
     make_flight,
 )
-from standoff.simulation.presets import FlightStyle
+from standoff_sim.clip.presets import FlightStyle
+from standoff_sim.movement.band_noise import BandNoise
+from tolerances import GEOMETRY_REL
+
+from standoff.core.homography import apply
 
 STYLES: tuple[FlightStyle, ...] = get_args(FlightStyle)
 TARGET_M = np.array([4.0, -3.0])

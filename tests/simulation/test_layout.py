@@ -4,14 +4,13 @@ import numpy as np
 import pytest
 import shapely
 from laws import seeds
-
-from standoff.simulation.layout import lay_out
-from standoff.simulation.mesh import Mesh, Surface, box
-from standoff.simulation.props.clutter import CLUTTER
-from standoff.simulation.props.prop import Prop
-from standoff.simulation.scene import Batch, place
-from standoff.simulation.terrain import Terrain
-from standoff.simulation.terrain_plan import TerrainPlan
+from standoff_sim.ground.terrain import Terrain
+from standoff_sim.ground.terrain_plan import TerrainPlan
+from standoff_sim.props.clutter import CLUTTER
+from standoff_sim.props.prop import Prop
+from standoff_sim.scene.layout import lay_out
+from standoff_sim.scene.scene import Batch, place
+from standoff_sim.solids.mesh import Mesh, Surface, box
 
 EXTENT_M = (-25.0, -20.0, 25.0, 20.0)
 CLEAR = (shapely.LineString([(-25, -8), (0, 0), (25, 4)]).buffer(2.0), shapely.Point(8, 10).buffer(3.0))

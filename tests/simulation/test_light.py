@@ -4,9 +4,8 @@ from typing import get_args
 
 import numpy as np
 import pytest
-
-from standoff.simulation.light import level_luminance, random_light
-from standoff.simulation.presets import Condition
+from standoff_sim.clip.presets import Condition
+from standoff_sim.scene.light import level_luminance, random_light
 
 CONDITIONS: tuple[Condition, ...] = get_args(Condition)
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])

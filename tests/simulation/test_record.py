@@ -8,13 +8,13 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from laws import seeds
+from standoff_sim.clip.presets import Plan, plan_clip
+from standoff_sim.clip.record import frame_times_s, record_clip
 from tolerances import GEOMETRY_REL
 
 from standoff.clips import CLIP_FORMAT, CLIP_FRAMES_SCHEMA, PAIRS_SCHEMA, TRUTH_SCHEMA
 from standoff.config import load_settings
 from standoff.core.errors import OutputError
-from standoff.simulation.presets import Plan, plan_clip
-from standoff.simulation.record import frame_times_s, record_clip
 from standoff.stages.frames import open_source
 from standoff.stages.ground import load_camera
 

@@ -6,20 +6,20 @@ import shapely
 import trimesh
 from laws import seeds
 from scipy.interpolate import LinearNDInterpolator
-
-from standoff.core.errors import ConfigError
-from standoff.core.homography import FloatArray
-from standoff.simulation.covers import COVER_KINDS, make_cover
-from standoff.simulation.reference import (
+from standoff_sim.ground.terrain import Terrain
+from standoff_sim.ground.terrain_plan import TerrainPlan
+from standoff_sim.scene.covers import COVER_KINDS, make_cover
+from standoff_sim.scene.reference import (
     BOARD_M,
     REFERENCE_KINDS,
     SQUARE_FOOTING_M,
     board_corners_m,
     make_reference,
 )
-from standoff.simulation.scene import Batch, Reference
-from standoff.simulation.terrain import Terrain
-from standoff.simulation.terrain_plan import TerrainPlan
+from standoff_sim.scene.scene import Batch, Reference
+
+from standoff.core.errors import ConfigError
+from standoff.core.homography import FloatArray
 
 LEVEL_M = 1.25
 CENTRE_M = (7.3, -11.6)

@@ -7,11 +7,11 @@ from typing import get_args
 import av
 import numpy as np
 import pytest
+from standoff_sim.camera.sensor import Sensor, VideoWriter, drone_bit_rate_bps
+from standoff_sim.clip.presets import Condition
 from tolerances import SWSCALE_LEVELS
 
 from standoff.core.types import ImageArray
-from standoff.simulation.presets import Condition
-from standoff.simulation.sensor import Sensor, VideoWriter, drone_bit_rate_bps
 from standoff.stages.frames import open_source
 
 CONDITIONS: tuple[Condition, ...] = get_args(Condition)

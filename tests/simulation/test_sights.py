@@ -3,25 +3,25 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from simulation.flat_ground import FlatGround
+from standoff_sim.camera.flight import Still
+from standoff_sim.clip.presets import plan_clip
+from standoff_sim.clip.studio import Studio
+from standoff_sim.clip.survey import Surveyor
+from standoff_sim.clip.truth import Sight, full_box_px
+from standoff_sim.machines.excavator import make_excavator
+from standoff_sim.movement.motion import Place, held
+from standoff_sim.people.worker import make_worker
+from standoff_sim.scene.light import random_light
+from standoff_sim.scene.moment import scene_at
+from standoff_sim.scene.scene import Actor, Batch, Model, Scene, place
+from standoff_sim.scene.sights import Outlines
+from standoff_sim.scene.site import build_site
+from standoff_sim.solids.lumps import cut, lumps_of
+from standoff_sim.solids.mesh import box, join, translation, tube
 from tolerances import HULL_BOX_PX, SURVEYED_BOX_PX, SURVEYED_SHARE
 
 from standoff.core.camera import Camera
 from standoff.core.homography import FloatArray
-from standoff.simulation.flight import Still
-from standoff.simulation.light import random_light
-from standoff.simulation.lumps import cut, lumps_of
-from standoff.simulation.machines.excavator import make_excavator
-from standoff.simulation.mesh import box, join, translation, tube
-from standoff.simulation.moment import scene_at
-from standoff.simulation.motion import Place, held
-from standoff.simulation.people.worker import make_worker
-from standoff.simulation.presets import plan_clip
-from standoff.simulation.scene import Actor, Batch, Model, Scene, place
-from standoff.simulation.sights import Outlines
-from standoff.simulation.site import build_site
-from standoff.simulation.studio import Studio
-from standoff.simulation.survey import Surveyor
-from standoff.simulation.truth import Sight, full_box_px
 
 _SIDES = ("x1_px", "y1_px", "x2_px", "y2_px")
 _CAMERA = Camera(

@@ -6,10 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from standoff.simulation.presets import Condition, plan_clip
-from standoff.simulation.site import Site, build_site
-from standoff.simulation.studio import Studio
+from standoff_sim.clip.presets import Condition, plan_clip
+from standoff_sim.clip.studio import Studio
+from standoff_sim.scene.site import Site, build_site
 
 
 def _site(name: str, seed: int, condition: Condition | None = None) -> Site:

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 from laws import seeds
 from simulation.flat_ground import FlatGround, camera, light
+from standoff_sim.behaviour import standing_working, stooping, walking_past
+from standoff_sim.camera.flight import Still
+from standoff_sim.clip.truth import full_box_px
+from standoff_sim.movement.motion import Place, sample
+from standoff_sim.people.worker import make_worker
+from standoff_sim.scene.casting import CASTS, Cast, Stage, bend_over, is_person
+from standoff_sim.scene.moment import scene_at
+from standoff_sim.scene.scene import Actor, Scene
 from tolerances import GEOMETRY_REL
 
 from standoff.core.homography import FloatArray
-from standoff.simulation.behaviour import standing_working, stooping, walking_past
-from standoff.simulation.casting import CASTS, Cast, Stage, bend_over, is_person
-from standoff.simulation.flight import Still
-from standoff.simulation.moment import scene_at
-from standoff.simulation.motion import Place, sample
-from standoff.simulation.people.worker import make_worker
-from standoff.simulation.scene import Actor, Scene
-from standoff.simulation.truth import full_box_px
 
 _LASTING_S = 60.0
 

@@ -8,17 +8,15 @@ from functools import partial
 import numpy as np
 import pytest
 from laws import seeds
-
-from standoff.core.homography import FloatArray
-from standoff.simulation.buildings import COTTAGES, FLATS, SHEDS, House, building, scaffolding
-from standoff.simulation.mesh import Mesh, Surface
-from standoff.simulation.outskirts import CAR_VARIANTS, STREET_VARIANTS, lay_land, lay_street, parked_car
-from standoff.simulation.panels import level, panels, upright
-from standoff.simulation.scene import NOTHING, PARKED, Batch
-from standoff.simulation.surroundings import REACH_M, Setting, make_surroundings
-from standoff.simulation.terrain import Terrain
-from standoff.simulation.terrain_plan import TerrainPlan
-from standoff.simulation.vegetation import (
+from standoff_sim.ground.terrain import Terrain
+from standoff_sim.ground.terrain_plan import TerrainPlan
+from standoff_sim.scene.scene import NOTHING, PARKED, Batch
+from standoff_sim.solids.mesh import Mesh, Surface
+from standoff_sim.solids.panels import level, panels, upright
+from standoff_sim.surroundings.buildings import COTTAGES, FLATS, SHEDS, House, building, scaffolding
+from standoff_sim.surroundings.outskirts import CAR_VARIANTS, STREET_VARIANTS, lay_land, lay_street, parked_car
+from standoff_sim.surroundings.surroundings import REACH_M, Setting, make_surroundings
+from standoff_sim.surroundings.vegetation import (
     BUSH_VARIANTS,
     FAR_VARIANTS,
     TREE_VARIANTS,
@@ -26,6 +24,8 @@ from standoff.simulation.vegetation import (
     far_tree,
     tree,
 )
+
+from standoff.core.homography import FloatArray
 
 _PLANTS = [
     *(partial(tree, i) for i in range(TREE_VARIANTS)),

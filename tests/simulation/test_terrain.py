@@ -11,11 +11,10 @@ import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
 from laws import examples, few, seeds
-
-from standoff.simulation.relief import beside, grid_shape, make_relief
-from standoff.simulation.site_plans import SiteStyle, random_plan
-from standoff.simulation.terrain import Terrain, make_terrain
-from standoff.simulation.terrain_plan import FlatPatch, Heap, Path, Pit, Slab, TerrainPlan
+from standoff_sim.ground.relief import beside, grid_shape, make_relief
+from standoff_sim.ground.site_plans import SiteStyle, random_plan
+from standoff_sim.ground.terrain import Terrain, make_terrain
+from standoff_sim.ground.terrain_plan import FlatPatch, Heap, Path, Pit, Slab, TerrainPlan
 
 _SQUARE: Path = ((-4.0, 2.0), (2.0, 2.0), (2.0, 8.0), (-4.0, 8.0))
 

@@ -9,6 +9,14 @@ import numpy as np
 import pytest
 from laws import seeds
 from simulation.flat_ground import FlatGround
+from standoff_sim.camera.flight import Still, drone_camera
+from standoff_sim.clip.presets import PRESETS, plan_clip
+from standoff_sim.clip.studio import Shot, Studio
+from standoff_sim.movement.motion import sample
+from standoff_sim.render import Look, Renderer
+from standoff_sim.scene.light import random_light
+from standoff_sim.scene.reference import make_reference
+from standoff_sim.scene.site import Site, build_site
 from tolerances import (
     BOARD_IN_PICTURE_PX,
     DISTORTION_PX,
@@ -19,14 +27,6 @@ from tolerances import (
 )
 
 from standoff.core.homography import FloatArray
-from standoff.simulation.flight import Still, drone_camera
-from standoff.simulation.light import random_light
-from standoff.simulation.motion import sample
-from standoff.simulation.presets import PRESETS, plan_clip
-from standoff.simulation.reference import make_reference
-from standoff.simulation.render import Look, Renderer
-from standoff.simulation.site import Site, build_site
-from standoff.simulation.studio import Shot, Studio
 
 pytestmark = pytest.mark.usefixtures("opengl")
 

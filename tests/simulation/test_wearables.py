@@ -4,21 +4,11 @@ import numpy as np
 import pyarrow as pa
 import pytest
 from simulation.flat_ground import FlatGround
-from tolerances import GEOMETRY_REL
-
-from standoff.clips import DEVICES_SCHEMA
-from standoff.core.camera import Camera
-from standoff.core.homography import FloatArray
-from standoff.simulation.behaviour import idle, walking_past
-from standoff.simulation.flight import Still
-from standoff.simulation.light import random_light
-from standoff.simulation.mesh import box, translation
-from standoff.simulation.motion import Place, sample
-from standoff.simulation.people.worker import make_worker
-from standoff.simulation.scene import Actor, Batch, Scene, place
-from standoff.simulation.telemetry import Origin
-from standoff.simulation.truth import Row
-from standoff.simulation.wearables import (
+from standoff_sim.behaviour import idle, walking_past
+from standoff_sim.camera.flight import Still
+from standoff_sim.camera.telemetry import Origin
+from standoff_sim.clip.truth import Row
+from standoff_sim.clip.wearables import (
     DRIFT_M,
     JITTER_S,
     NEAR_FACTOR,
@@ -28,6 +18,16 @@ from standoff.simulation.wearables import (
     SHORTEST_OUTAGE_S,
     report_positions,
 )
+from standoff_sim.movement.motion import Place, sample
+from standoff_sim.people.worker import make_worker
+from standoff_sim.scene.light import random_light
+from standoff_sim.scene.scene import Actor, Batch, Scene, place
+from standoff_sim.solids.mesh import box, translation
+from tolerances import GEOMETRY_REL
+
+from standoff.clips import DEVICES_SCHEMA
+from standoff.core.camera import Camera
+from standoff.core.homography import FloatArray
 
 _LASTING_S = 500.0
 _ORIGIN = Origin.draw(np.random.default_rng(9))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import sys
+from importlib.metadata import entry_points
 from typing import Annotated
 
 import typer
@@ -23,7 +24,7 @@ from standoff.cli import (
     marker,
     quantize,
     run,
-    simulate,
+    simulator,
     train,
     train_points,
 )
@@ -48,10 +49,22 @@ app.command("calibrate")(calibrate.calibrate)
 app.command("marker")(marker.marker)
 app.add_typer(evaluate.app, name="evaluate")
 app.add_typer(config.app, name="config")
-app.add_typer(simulate.app, name="simulate")
 app.command("demo")(demo.demo)
 app.command("bench")(bench.bench)
 app.command("doctor")(doctor.doctor)
+
+
+def _join_verbs() -> None:
+    """Add the verbs that other distributions bring: `simulate` comes from the simulator."""
+    brought = {point.name: point for point in entry_points(group="standoff.verbs")}
+    for name, point in brought.items():
+        app.add_typer(point.load(), name=name)
+    if "simulate" not in brought:
+        anything = {"allow_extra_args": True, "ignore_unknown_options": True}
+        app.command("simulate", context_settings=anything)(simulator.absent)
+
+
+_join_verbs()
 
 
 def _print_version(wanted: bool) -> None:

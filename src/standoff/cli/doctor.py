@@ -113,15 +113,16 @@ def _encoders() -> list[Finding]:
 
 
 def _opengl() -> list[Finding]:
+    from standoff.cli.simulator import INSTALL
     from standoff.core.errors import MissingDependency
 
     found, fix = "", ""
     try:
-        from standoff.simulation.render.context import open_context
+        from standoff_sim.render.context import open_context
 
         context = open_context()
     except ImportError:
-        fix = "pip install 'standoff[sim]'"
+        fix = INSTALL
     except MissingDependency as error:
         fix = error.fix
     else:

@@ -12,8 +12,9 @@ import typer
 from standoff.core.errors import ConfigError, StandoffError
 
 if TYPE_CHECKING:
+    from standoff_sim.clip.presets import Plan
+
     from standoff.evaluation.paper import BoxError, ClipResult, Trial
-    from standoff.simulation.presets import Plan
 
 Method = Literal["fused", "refined", "paper", "paper+tls", "oriented"]
 Anchor = Literal["ground_point", "bottom_centre", "box_centre"]
@@ -134,12 +135,15 @@ def _box_error(detector: str, text: str | None) -> BoxError:
 
 def _plan_presets(folder: Path | None, seed: int, size: str | None, frames: int | None) -> dict[Path, Plan]:
     """Return a folder for each preset, with what to render where there is no clip yet."""
-    from standoff.cli.simulate import parse_size
-    from standoff.simulation.presets import PRESETS, plan_clip
+    from standoff.cli.numbers import size_or_none
+    from standoff.cli.simulator import require_simulator
 
     if folder is None:
         raise ConfigError(expected="--clips FOLDER with --all", found="none", fix="say where the clips are or shall be")
-    width_px, height_px = parse_size(size)
+    require_simulator()
+    from standoff_sim.clip.presets import PRESETS, plan_clip
+
+    width_px, height_px = size_or_none(size)
     return {
         folder / name: plan_clip(name, seed=seed, width_px=width_px, height_px=height_px, frames=frames)
         for name in PRESETS
@@ -164,11 +168,9 @@ def _evaluate_all(
 
 
 def _render(plan: Plan, folder: Path) -> None:
-    from standoff.cli.console import progress
-    from standoff.simulation import require_packages
+    from standoff_sim.clip.record import record_clip
 
-    require_packages()
-    from standoff.simulation.record import record_clip
+    from standoff.cli.console import progress
 
     with progress(f"rendering {plan.name}", plan.preset.frames) as on_frame:
         record_clip(plan, folder, on_frame=on_frame)

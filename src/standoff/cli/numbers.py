@@ -42,3 +42,10 @@ def frame_range(text: str | None) -> tuple[int, int] | None:
     if not 0 < first <= last:
         raise ConfigError(expected=expected, found=repr(text), fix=f"write for example {example}")
     return first, last
+
+
+def size_or_none(size: str | None) -> tuple[int | None, int | None]:
+    """Read `--size WIDTHxHEIGHT`; None stays (None, None)."""
+    if size is None:
+        return None, None
+    return two_integers(size, "x", expected="a size as WIDTHxHEIGHT", example="1920x1080")

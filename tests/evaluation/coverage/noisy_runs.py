@@ -12,6 +12,8 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
+from standoff_sim.clip.presets import plan_clip
+from standoff_sim.clip.record import record_truth
 
 from standoff.core import homography, protocols
 from standoff.core.classes import CLASS_BY_NAME
@@ -20,8 +22,6 @@ from standoff.core.pose import LENS, SHIFT, TURN, View
 from standoff.core.types import CameraMotion, Detections, Frame, GroundMap, NoCameraMotion
 from standoff.evaluation.coverage import ClipSamples, read_samples
 from standoff.monitor import Monitor, Run
-from standoff.simulation.presets import plan_clip
-from standoff.simulation.record import record_truth
 from standoff.stages.frames import ArrayPicture
 from standoff.stages.ground import load_camera, map_from_view
 from standoff.stages.hazard import HazardMonitor

@@ -13,12 +13,12 @@ import pytest
 import tolerances
 from evaluation.paper import drawn_board
 from pages import without_pictures
+from standoff_sim.clip.presets import PRESETS, Plan
 from typer.testing import CliRunner
 
 from standoff.cli.app import app
 from standoff.core.errors import ConfigError, SimulationError
 from standoff.evaluation.paper.published import PUBLISHED
-from standoff.simulation.presets import PRESETS, Plan
 
 
 def evaluate(*words: object) -> str:
@@ -168,9 +168,9 @@ def test_every_preset_is_looked_for_and_none_that_is_there_is_rendered(
         rendered.append((plan.name, plan.preset.frames, plan.preset.width_px))
         raise SimulationError(expected="a graphics card", found="none", fix="buy one")
 
-    monkeypatch.setattr("standoff.simulation.record.record_clip", refuse)
+    monkeypatch.setattr("standoff_sim.clip.record.record_clip", refuse)
     few = {name: PRESETS[name] for name in ("virtual", "board", "busy", "far")}
-    monkeypatch.setattr("standoff.simulation.presets.PRESETS", few)
+    monkeypatch.setattr("standoff_sim.clip.presets.PRESETS", few)
     shutil.copytree(clip_folder, tmp_path / "virtual")
     shutil.copytree(board_folder, tmp_path / "board")
     words = ["--all", "--clips", tmp_path, "--size", "640x360", "--frames", "6", "--json", tmp_path / "all.json"]

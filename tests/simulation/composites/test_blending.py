@@ -3,9 +3,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 import pytest
-
-from standoff.simulation.composites.blending import Match, blend, decoded, encoded
-from standoff.simulation.render import Cutout
+from standoff_sim.composites.blending import Match, blend, decoded, encoded
+from standoff_sim.render import Cutout
 
 _SHAPE = (64, 96)
 

@@ -6,11 +6,8 @@ import numpy as np
 import pytest
 import shapely
 from laws import seeds
-
-from standoff.core.classes import CLASS_BY_NAME
-from standoff.core.homography import FloatArray
-from standoff.simulation.machines.loader_meshes import SIZES
-from standoff.simulation.machines.wheel_loader import (
+from standoff_sim.machines.loader_meshes import SIZES
+from standoff_sim.machines.wheel_loader import (
     LIMITS,
     WheelLoader,
     build_wheel_loader,
@@ -20,7 +17,10 @@ from standoff.simulation.machines.wheel_loader import (
     make_wheel_loader,
     tilt_pivot_m,
 )
-from standoff.simulation.scene import Batch
+from standoff_sim.scene.scene import Batch
+
+from standoff.core.classes import CLASS_BY_NAME
+from standoff.core.homography import FloatArray
 
 
 def _points_m(batches: Iterable[Batch]) -> FloatArray:

@@ -4,9 +4,8 @@ from collections import Counter
 
 import numpy as np
 import pytest
-
-from standoff.simulation.mesh import Colour
-from standoff.simulation.people.outfit import HARD_HAT_COLOURS, HAT_SHARES, HI_VIS_SHARE, Outfit, choose_outfit
+from standoff_sim.people.outfit import HARD_HAT_COLOURS, HAT_SHARES, HI_VIS_SHARE, Outfit, choose_outfit
+from standoff_sim.solids.mesh import Colour
 
 COUNT = 400
 THREE_SIGMA = 3.0 * 0.5 / COUNT**0.5

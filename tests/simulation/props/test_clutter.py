@@ -3,14 +3,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapely
+from standoff_sim.props.clutter import CLUTTER
+from standoff_sim.props.heaps import scatter_litter
+from standoff_sim.props.materials import SOILS, bar, block, mound, open_ended, relief, stone, tubular
+from standoff_sim.props.prop import Prop
+from standoff_sim.scene.scene import Batch
+from standoff_sim.solids.mesh import Surface
 
 from standoff.core.homography import FloatArray
-from standoff.simulation.mesh import Surface
-from standoff.simulation.props.clutter import CLUTTER
-from standoff.simulation.props.heaps import scatter_litter
-from standoff.simulation.props.materials import SOILS, bar, block, mound, open_ended, relief, stone, tubular
-from standoff.simulation.props.prop import Prop
-from standoff.simulation.scene import Batch
 
 SEEDS = range(4)
 NAMES = [prop.name for prop in CLUTTER]

@@ -11,6 +11,8 @@ from drawn_ground import frame
 from drawn_solid import motion_between
 from sloping_site import SlopingSite, places_m, sloping_site
 from stages.ground.test_surveyed import STILL, blank_frame, refusal, updated
+from standoff_sim.ground.relief import make_relief
+from standoff_sim.ground.terrain_plan import TerrainPlan
 from tolerances import GROUND_THROUGH_LENS_M, OFF_PLANE_M, RELIEF_COVERAGE
 
 from standoff.core.camera import Camera, CameraPrior
@@ -21,8 +23,6 @@ from standoff.core.pose import View
 from standoff.core.telemetry import Telemetry
 from standoff.core.types import Detections, GroundMap, NoGroundMap
 from standoff.evaluation.drawn_markers import Hardship, draw_marker, through_camera
-from standoff.simulation.relief import make_relief
-from standoff.simulation.terrain_plan import TerrainPlan
 from standoff.stages.ground import (
     FusedGround,
     FusedParams,

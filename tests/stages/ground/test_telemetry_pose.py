@@ -5,15 +5,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from standoff_sim.camera.flight import drone_camera, make_flight
+from standoff_sim.camera.telemetry import write_telemetry
+from standoff_sim.clip.presets import FlightStyle
 from tolerances import NUMERICAL_DERIVATIVE_REL
 
 from standoff.core.camera import Camera
 from standoff.core.pose import View
 from standoff.core.telemetry import Telemetry
 from standoff.core.types import NoGroundMap
-from standoff.simulation.flight import drone_camera, make_flight
-from standoff.simulation.presets import FlightStyle
-from standoff.simulation.telemetry import write_telemetry
 from standoff.stages.frames.flight_log import FlightLog, read_flight_log
 from standoff.stages.ground import TelemetryPose, view_from_telemetry
 

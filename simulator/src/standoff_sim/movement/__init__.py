@@ -1,0 +1,1 @@
+"""Where somebody is at a time, and how people and machines get there."""

@@ -1,0 +1,1 @@
+"""What a site is made of, who works there, and where everything stands at a moment."""

@@ -1,0 +1,354 @@
+"""Who is on the site and what they do, for each kind of clip.
+
+Casts are written in the stage's own directions, as the camera sees them: x to the right, y away from it, metres from
+the middle of the picture; turns in degrees, counter-clockwise from x.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+import shapely
+
+from standoff.core.homography import FloatArray
+from standoff_sim import behaviour
+from standoff_sim.machines.dozer import make_dozer
+from standoff_sim.machines.dump_truck import make_dump_truck
+from standoff_sim.machines.excavator import make_excavator
+from standoff_sim.machines.mesh_file import load_excavator
+from standoff_sim.machines.roller import make_roller
+from standoff_sim.machines.vehicle import make_vehicle
+from standoff_sim.machines.wheel_loader import make_wheel_loader
+from standoff_sim.movement.motion import Place, sample
+from standoff_sim.people.anthropometry import MEAN_STATURE_M
+from standoff_sim.people.worker import make_worker
+from standoff_sim.scene.scene import Actor, Model, Motion
+
+_SWEEP_STEP_S = 0.5
+_PROPS_AWAY_M = 0.8
+_TOOL_RADIUS_M = 1.2
+_TRIES = 12
+_BUSY_WORKERS, _BUSY_MACHINES = 8, 5
+_BREACH_M, _NEAR_MISS_M = 5.6, 8.4
+"""Distances of worker and wheel loader, whose circles touch at 7.8 m."""
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """The ground that the camera looks at.
+
+    Attributes:
+        heading_deg: Of the camera, clockwise from north.
+        scale: 1 for a camera at 25 m; things stand further apart when seen from higher up.
+        duration_s: Of all motions.
+        excavator_mesh: Folder of parts in place of the procedural excavators, or None.
+        reference_m: (2,) where the reference object's middle is, in the stage's directions; None without one.
+        mean_stature_m: Of the workers, barefoot.
+    """
+
+    heading_deg: float
+    scale: float
+    duration_s: float
+    excavator_mesh: Path | None
+    reference_m: tuple[float, float] | None
+    mean_stature_m: float = MEAN_STATURE_M
+
+    def place(self, x_m: float, y_m: float, turn_deg: float = 0.0) -> Place:
+        """Return a place on the stage in site coordinates."""
+        right_rad = -np.deg2rad(self.heading_deg)
+        return Place(0.0, 0.0, float(right_rad)).moved(x_m, y_m, float(np.deg2rad(turn_deg)))
+
+    def excavator(self, rng: np.random.Generator) -> Model:
+        """Draw an excavator, from the mesh folder if there is one."""
+        return make_excavator(rng) if self.excavator_mesh is None else load_excavator(self.excavator_mesh, rng)
+
+    def worker(self, rng: np.random.Generator) -> Model:
+        """Draw a worker of this site's stature."""
+        return make_worker(rng, mean_stature_m=self.mean_stature_m)
+
+
+@dataclass(slots=True)
+class Cast:
+    """The actors so far, and the ground that they need.
+
+    Attributes:
+        actors: Numbered from 1.
+        machines_way: Where machines go, in the site frame.
+        peoples_way: Where people go.
+    """
+
+    actors: list[Actor] = field(default_factory=list)
+    machines_way: list[shapely.Geometry] = field(default_factory=list)
+    peoples_way: list[shapely.Geometry] = field(default_factory=list)
+
+    def add(self, models: Sequence[Model], motions: Sequence[Motion], *, force: bool = False) -> bool:
+        """Add entities that act together, if nobody else is in their way.
+
+        Args:
+            models: Who.
+            motions: What each does; they may come as close to each other as they like.
+            force: Add them in any case.
+
+        Returns:
+            Whether they were added.
+        """
+        ways = [swept(model, motion) for model, motion in zip(models, motions, strict=True)]
+        taken = shapely.union_all([*self.machines_way, *self.peoples_way])
+        if not force and shapely.union_all(ways).intersects(taken):
+            return False
+        for model, motion, way in zip(models, motions, ways, strict=True):
+            self.actors.append(Actor(len(self.actors) + 1, model, motion))
+            (self.peoples_way if is_person(model) else self.machines_way).append(way)
+        return True
+
+    @property
+    def ways(self) -> list[shapely.Polygon]:
+        """Return all ground that actors need, with room around."""
+        rooms = [way.buffer(_PROPS_AWAY_M) for way in (*self.machines_way, *self.peoples_way)]
+        return list(shapely.get_parts(rooms))
+
+
+def is_person(model: Model) -> bool:
+    """Return whether a model is a worker."""
+    return model.class_id == 0
+
+
+def swept(model: Model, motion: Motion) -> shapely.Geometry:
+    """Return all ground that an entity's footprint and tool pass over."""
+    shapes: list[shapely.Geometry] = []
+    before: shapely.Polygon | None = None
+    for time_s in np.arange(0.0, motion.time_s[-1] + _SWEEP_STEP_S, _SWEEP_STEP_S):
+        placement = sample(motion, float(time_s))
+        outline = shapely.Polygon(placement.to_site(model.footprint_m))
+        shapes.append(shapely.union(before or outline, outline).convex_hull)
+        before = outline
+        tip_m = model.tool_tip_m(placement.joints)
+        if tip_m is not None:
+            shapes.append(shapely.Point(placement.to_site(tip_m[:2])).buffer(_TOOL_RADIUS_M, quad_segs=3))
+    return shapely.union_all(shapes).buffer(0.1).simplify(0.05)
+
+
+def bend_over(rng: np.random.Generator, cast: Cast, share: float) -> None:
+    """Let a share of the workers, whoever they are, do what they do stooping; ways and times stay as they are."""
+    people = [k for k, actor in enumerate(cast.actors) if is_person(actor.model)]
+    for k in rng.permutation(people)[: round(share * len(people))].tolist():
+        actor = cast.actors[k]
+        cast.actors[k] = replace(actor, motion=behaviour.stooping(rng, actor.motion))
+
+
+def _mobile(rng: np.random.Generator, stage: Stage) -> Cast:
+    """The paper's mobile test: one worker, one wheel loader, one excavator."""
+    cast = Cast()
+    excavator, loader, worker = stage.excavator(rng), make_wheel_loader(rng), stage.worker(rng)
+    digs = behaviour.digging(rng, excavator, stage.place(9.0, 6.5, float(rng.uniform(200.0, 240.0))), stage.duration_s)
+    cast.add([excavator], [digs], force=True)
+    spreads = behaviour.spreading(rng, loader, stage.place(-14.0, 8.0, -4.0), 15.0, stage.duration_s)
+    cast.add([loader], [spreads], force=True)
+    points = [stage.place(x, y) for x, y in ((6.0, -5.0), (2.0, -0.5), (-3.0, 1.8), (-9.0, 1.5), (-13.0, -2.0))]
+    walks = behaviour.walking_past(rng, worker, [(p.x_m, p.y_m) for p in points], stage.duration_s)
+    cast.add([worker], [walks], force=True)
+    return cast
+
+
+def _demo(rng: np.random.Generator, stage: Stage) -> Cast:
+    """One near miss and one breach: a reversing loader passes one worker, and another crosses behind it.
+
+    The excavator and the worker at the footing keep away from everybody.
+    """
+    cast = Cast()
+    excavator, loader = stage.excavator(rng), make_wheel_loader(rng)
+    beside, behind, apart = stage.worker(rng), stage.worker(rng), stage.worker(rng)
+    digs = behaviour.digging(rng, excavator, stage.place(13.0, 8.0, 70.0), stage.duration_s)
+    cast.add([excavator], [digs], force=True)
+    start = stage.place(-10.0, 14.0, 97.0)
+    crossing = behaviour.crossing_behind(
+        rng, loader, behind, start, stage.duration_s, closest_m=_BREACH_M, to_left=True
+    )
+    cast.add([loader, behind], crossing, force=True)
+    works = behaviour.standing_working(rng, beside, start.moved(-4.0, _NEAR_MISS_M), stage.duration_s)
+    cast.add([beside], [works], force=True)
+    measures = behaviour.standing_working(rng, apart, stage.place(3.0, -6.5), stage.duration_s)
+    cast.add([apart], [measures], force=True)
+    return cast
+
+
+def _stationary(rng: np.random.Generator, stage: Stage, *, distance_m: float) -> Cast:
+    """The paper's stationary test: worker and excavator at exactly a distance."""
+    cast = Cast()
+    models = (stage.excavator(rng), stage.worker(rng))
+    tilt_deg = float(rng.uniform(-8.0, 8.0))
+    place = stage.place(distance_m / 2, 2.5, tilt_deg + float(rng.uniform(-60.0, 60.0)))
+    bearing_rad = float(np.deg2rad(180.0 + tilt_deg - stage.heading_deg))
+    motions = behaviour.keep_distance(
+        rng, *models, place, stage.duration_s, distance_m=distance_m, bearing_rad=bearing_rad
+    )
+    cast.add(models, motions, force=True)
+    return cast
+
+
+def _nobody(rng: np.random.Generator, stage: Stage) -> Cast:
+    return Cast()
+
+
+def crowd(rng: np.random.Generator, stage: Stage, *, workers: int, machines: int, parked: int = 0) -> Cast:
+    """Draw activities until there are so many workers and machines, or no room is left.
+
+    Args:
+        rng: Decides everything.
+        stage: Where.
+        workers: Wanted.
+        machines: Wanted.
+        parked: Vehicles that stand on the site besides, at most.
+    """
+    cast = Cast()
+    keep = _reserve_reference(stage)
+    if keep is not None:
+        cast.machines_way.append(keep)
+    for _ in range(_TRIES * machines):
+        left = machines - sum(not is_person(actor.model) for actor in cast.actors)
+        if left <= 0:
+            break
+        cast.add(*_machine_activity(rng, stage, left, workers))
+    for _ in range(parked):
+        vehicle = make_vehicle(rng)
+        cast.add([vehicle], [behaviour.idle(rng, vehicle, _spot(rng, stage), stage.duration_s)])
+    for _ in range(_TRIES * workers):
+        left = workers - sum(is_person(actor.model) for actor in cast.actors)
+        if left <= 0:
+            break
+        cast.add(*_people_activity(rng, stage, left, cast))
+    if keep is not None:
+        cast.machines_way.remove(keep)
+    return cast
+
+
+def _reserve_reference(stage: Stage) -> shapely.Polygon | None:
+    if stage.reference_m is None:
+        return None
+    return shapely.Point(stage.place(*stage.reference_m).xy_m).buffer(3.0)
+
+
+_Activity = tuple[Sequence[Model], Sequence[Motion]]
+
+
+def _spot(rng: np.random.Generator, stage: Stage) -> Place:
+    """Draw a place in the picture: fewer towards the edges, more far away than near, where there is more ground."""
+    x_m, y_m = rng.normal([0.0, 3.0], [9.0, 8.0]) * stage.scale
+    return stage.place(float(x_m), float(y_m), float(rng.uniform(0.0, 360.0)))
+
+
+def _machine_activity(rng: np.random.Generator, stage: Stage, left: int, workers: int) -> _Activity:
+    place, lasting_s = _spot(rng, stage), stage.duration_s
+    kinds = ["dig", "grade", "spread", "roll", "doze", "drive", "idle"] + ["load", "shovel"] * (left > 1)
+    if workers > 1:
+        kinds += ["behind", "miss"]
+    kind = str(rng.choice(kinds))
+    if kind in ("dig", "grade"):
+        excavator = stage.excavator(rng)
+        script = behaviour.digging if kind == "dig" else behaviour.grading
+        return [excavator], [script(rng, excavator, place, lasting_s)]
+    if kind == "load":
+        pair = stage.excavator(rng), make_dump_truck(rng)
+        beside = place.moved(0.0, float(rng.choice([-1, 1]) * rng.uniform(7.0, 8.5)), float(rng.normal(0.0, 0.4)))
+        return pair, behaviour.truck_loading(rng, *pair, place, beside, lasting_s)
+    if kind == "shovel":
+        pair = make_wheel_loader(rng), make_dump_truck(rng)
+        beside = place.moved(-9.0, float(rng.choice([-1, 1]) * 8.0), float(rng.normal(0.0, 0.3)))
+        return pair, behaviour.loader_loading(rng, *pair, place, beside, lasting_s)
+    if kind in ("behind", "miss"):
+        machine, worker = _driving_machine(rng), stage.worker(rng)
+        if kind == "behind":
+            return (machine, worker), behaviour.crossing_behind(rng, machine, worker, place, lasting_s)
+        return (machine, worker), behaviour.near_miss(rng, machine, worker, place, lasting_s)
+    return _lone_machine(rng, stage, kind, place)
+
+
+def _lone_machine(rng: np.random.Generator, stage: Stage, kind: str, place: Place) -> _Activity:
+    lasting_s, length_m = stage.duration_s, float(rng.uniform(10.0, 18.0))
+    machine: Model
+    if kind == "spread":
+        machine = make_wheel_loader(rng) if rng.random() < 0.5 else make_dump_truck(rng)
+        motion = behaviour.spreading(rng, machine, place, length_m, lasting_s)
+    elif kind == "roll":
+        machine = make_roller(rng)
+        motion = behaviour.rolling(rng, machine, place, length_m, lasting_s)
+    elif kind == "doze":
+        machine = make_dozer(rng)
+        motion = behaviour.dozing(rng, machine, place, length_m, lasting_s)
+    elif kind == "drive":
+        machine = make_vehicle(rng) if rng.random() < 0.6 else make_dump_truck(rng)
+        end = place.moved(float(rng.uniform(25.0, 40.0)), float(rng.normal(0.0, 4.0)), float(rng.normal(0.0, 0.3)))
+        motion = behaviour.driving_through(rng, machine, place, end, lasting_s)
+    else:
+        machine = _any_machine(rng, stage)
+        motion = behaviour.idle(rng, machine, place, lasting_s)
+    return [machine], [motion]
+
+
+def _any_machine(rng: np.random.Generator, stage: Stage) -> Model:
+    makers: tuple[Callable[[np.random.Generator], Model], ...] = (
+        stage.excavator, make_wheel_loader, make_dump_truck, make_roller, make_dozer, make_vehicle, make_vehicle
+    )  # fmt: skip
+    return makers[int(rng.integers(len(makers)))](rng)
+
+
+def _driving_machine(rng: np.random.Generator) -> Model:
+    makers: tuple[Callable[[np.random.Generator], Model], ...]
+    makers = (make_wheel_loader, make_dump_truck, make_roller, make_dozer)
+    return makers[int(rng.integers(len(makers)))](rng)
+
+
+def _people_activity(rng: np.random.Generator, stage: Stage, left: int, cast: Cast) -> _Activity:
+    place, lasting_s = _near_somebody(rng, stage, cast), stage.duration_s
+    kind = str(rng.choice(["work", "carry", "walk"] + ["talk"] * (left > 1)))
+    if kind == "talk":
+        pair = stage.worker(rng), stage.worker(rng)
+        return pair, behaviour.pair_talking(rng, pair, place, lasting_s)
+    worker = stage.worker(rng)
+    if kind == "work":
+        return [worker], [behaviour.standing_working(rng, worker, place, lasting_s)]
+    reach_m = float(rng.uniform(5.0, 12.0))
+    if kind == "carry":
+        return [worker], [behaviour.carrying_between(rng, worker, place, place.moved(reach_m), lasting_s)]
+    bend = place.moved(reach_m / 2, float(rng.normal(0.0, 2.0)))
+    end = place.moved(reach_m)
+    points = [(p.x_m, p.y_m) for p in (place, bend, end)]
+    return [worker], [behaviour.walking_past(rng, worker, points, lasting_s)]
+
+
+def _near_somebody(rng: np.random.Generator, stage: Stage, cast: Cast) -> Place:
+    """Draw a place for people: half of them keep near a machine or near each other."""
+    if not cast.actors or rng.random() < 0.5:
+        return _spot(rng, stage)
+    other = cast.actors[int(rng.integers(len(cast.actors)))]
+    away_m, turn_rad = float(rng.uniform(1.5, 7.0)), float(rng.uniform(0.0, 2 * np.pi))
+    beside: FloatArray = sample(other.motion, 0.0).xy_m + away_m * np.array([np.cos(turn_rad), np.sin(turn_rad)])
+    return Place(float(beside[0]), float(beside[1]), float(rng.uniform(0.0, 2 * np.pi)))
+
+
+def _any_number(rng: np.random.Generator, stage: Stage) -> Cast:
+    """Few or many: now and then an empty site, so that a picture without people is nothing unusual."""
+    if rng.random() < 0.05:
+        return Cast()
+    return crowd(
+        rng, stage, workers=int(rng.integers(1, 13)), machines=int(rng.integers(0, 7)), parked=int(rng.integers(0, 4))
+    )
+
+
+CASTS: Mapping[str, Callable[[np.random.Generator, Stage], Cast]] = MappingProxyType(
+    {
+        "mobile": _mobile,
+        "demo": _demo,
+        "stationary-15": partial(_stationary, distance_m=15.0),
+        "stationary-20": partial(_stationary, distance_m=20.0),
+        "board": _nobody,
+        "random": _any_number,
+        "busy": partial(crowd, workers=_BUSY_WORKERS, machines=_BUSY_MACHINES),
+    }
+)
+"""By `Preset.cast`."""

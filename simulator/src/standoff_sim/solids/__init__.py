@@ -1,0 +1,1 @@
+"""Triangles: the solids that everything on the site is built from."""
