@@ -40,11 +40,11 @@ class Painter:
         self.font_px: int = max(11, round(height / 54))
         self._taken: list[Rectangle] = []
 
-    def shows(self, xyxy_px: FloatArray) -> bool:
+    def shows(self, xyxy_px: Sequence[float]) -> bool:
         """Return whether a part of a box lies on the canvas."""
         height, width = self._canvas.shape[:2]
         x1, y1, x2, y2 = xyxy_px
-        return bool(x1 < width and y1 < height and x2 > 0 and y2 > 0)
+        return x1 < width and y1 < height and x2 > 0 and y2 > 0
 
     def line(self, points_px: FloatArray, colour: Bgr, *, dashed: bool = False) -> None:
         """Draw a curve through (N, 2) points without sharp corners, or any polyline in dashes."""
@@ -66,9 +66,9 @@ class Painter:
         for colour, width_px in pens:
             cv2.polylines(self._canvas, strokes, False, colour, width_px, cv2.LINE_AA, _SHIFT)
 
-    def box(self, xyxy_px: FloatArray, colour: Bgr, *, dashed: bool = False) -> None:
+    def box(self, xyxy_px: Sequence[float], colour: Bgr, *, dashed: bool = False) -> None:
         """Draw a rectangle."""
-        x1, y1, x2, y2 = (min(max(edge_px, -_FAR_PX), _FAR_PX) for edge_px in xyxy_px.tolist())
+        x1, y1, x2, y2 = (min(max(edge_px, -_FAR_PX), _FAR_PX) for edge_px in xyxy_px)
         if dashed:
             self.line(np.array([[x1, y1], [x2, y1], [x2, y2], [x1, y2], [x1, y1]]), colour, dashed=True)
             return
@@ -76,9 +76,9 @@ class Painter:
         cv2.rectangle(self._canvas, *corners, bgr("dark"), self.stroke_px + 2)
         cv2.rectangle(self._canvas, *corners, colour, self.stroke_px)
 
-    def dot(self, point_px: FloatArray, colour: Bgr, *, hollow: bool = False) -> None:
+    def dot(self, point_px: Sequence[float], colour: Bgr, *, hollow: bool = False) -> None:
         """Draw a small disc with a dark edge."""
-        x, y = point_px.tolist()
+        x, y = point_px
         if not (math.isfinite(x) and math.isfinite(y)):
             return
         centre = tuple(round(min(max(one_px, -_FAR_PX), _FAR_PX) * (1 << _SHIFT)) for one_px in (x, y))
