@@ -100,6 +100,25 @@ def point_jacobian(matrix: FloatArray, points: FloatArray) -> FloatArray:
     return jacobian
 
 
+def stretches(jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return how long a step of one becomes under each linear map, at most and at least: its singular values.
+
+    Args:
+        jacobian: (N, 2, 2).
+
+    Returns:
+        (N,) and (N,); NaN where the map is.
+
+    >>> stretches(np.array([[[0.0, -3.0], [2.0, 0.0]]]))
+    (array([3.]), array([2.]))
+    """
+    (a, b), (c, d) = jacobian.transpose(1, 2, 0)
+    longest: FloatArray = (np.hypot(a + d, b - c) + np.hypot(a - d, b + c)) / 2.0
+    # The difference of the two would cancel.
+    shortest: FloatArray = np.abs(a * d - b * c) / np.where(longest > 0.0, longest, 1.0)
+    return longest, shortest
+
+
 def parameter_jacobian(matrix: FloatArray, points: FloatArray) -> FloatArray:
     """Return d target point / d the nine entries of the matrix, row by row.
 
