@@ -130,11 +130,17 @@ def _draw_circles(painter: Painter, to_canvas: _ToCanvas, sketch: Sketch, ground
 
 
 def _draw_fans(painter: Painter, to_canvas: _ToCanvas, sketch: Sketch, ground: GroundMap) -> None:
-    for fan in sketch.fans:
-        (path_px, path_seen), (outline_px, outline_seen) = ground.to_image(fan.path_m), ground.to_image(fan.outline_m)
-        if path_seen.all() and outline_seen.all():
-            painter.fill(to_canvas(outline_px), bgr(sketch.tones[fan.row]), FAN_OPACITY)
-            painter.line(to_canvas(path_px), bgr(sketch.tones[fan.row]))
+    if not sketch.fans:
+        return
+    # All at once: a map with a lens costs by the call.
+    curves_m = [curve_m for fan in sketch.fans for curve_m in (fan.outline_m, fan.path_m)]
+    points_px, seen = ground.to_image(np.concatenate(curves_m))
+    ends = np.cumsum([len(curve_m) for curve_m in curves_m])[:-1]
+    curves_px, all_seen = np.split(to_canvas(points_px), ends), [part.all() for part in np.split(seen, ends)]
+    for k, fan in enumerate(sketch.fans):
+        if all_seen[2 * k] and all_seen[2 * k + 1]:
+            painter.fill(curves_px[2 * k], bgr(sketch.tones[fan.row]), FAN_OPACITY)
+            painter.line(curves_px[2 * k + 1], bgr(sketch.tones[fan.row]))
 
 
 def _draw_boxes(painter: Painter, to_canvas: _ToCanvas, sketch: Sketch) -> None:
