@@ -94,11 +94,13 @@ class KnownBefore:
 
     def __init__(self, site: Site, frames: int) -> None:
         self.frames = list(site.frames(frames))
-        self._detections = [site.detections(frame.index) for frame in self.frames]
+        self._detections: list[Detections] = [site.detections(frame.index) for frame in self.frames]
         motion, ground = MotionEstimator(), site.ground("surveyed")
         seen = list(zip(self.frames, self._detections, strict=True))
-        self._motions = [motion.update(frame, detections) for frame, detections in seen]
-        self._maps = [ground.update(*one, moved) for one, moved in zip(seen, self._motions, strict=True)]
+        self._motions: list[AnyMotion] = [motion.update(frame, detections) for frame, detections in seen]
+        self._maps: list[AnyGround] = [
+            ground.update(*one, moved) for one, moved in zip(seen, self._motions, strict=True)
+        ]
 
     def detect(self, frame: Frame) -> Detections:
         return self._detections[frame.index]
