@@ -242,3 +242,11 @@ def test_signed_puts_the_given_point_in_front_and_has_norm_one() -> None:
         signed = homography.signed(factor * matrix, np.array([960.0, 900.0]))
         np.testing.assert_allclose(signed, matrix, rtol=1e-12)
         assert np.linalg.norm(signed) == pytest.approx(1.0)
+
+
+@given(maps, seeds)
+def test_stretches_are_the_singular_values_of_a_map(ground_map: FloatArray, seed: int) -> None:
+    jacobian = homography.point_jacobian(ground_map, random_points(seed))
+    jacobian = jacobian[np.isfinite(jacobian).all(axis=(1, 2))]
+    longest, shortest = np.linalg.svd(jacobian, compute_uv=False).T.reshape(2, -1)
+    np.testing.assert_allclose(homography.stretches(jacobian), (longest, shortest), rtol=GEOMETRY_REL)

@@ -21,8 +21,8 @@ def test_no_point_is_too_far_to_be_drawn(points: list[tuple[float, float]], dash
     outline = np.array(points)
     painter.cased_line(outline, bgr("danger"), dashed=dashed)
     painter.fill(outline, bgr("danger"), 0.5)
-    painter.dot(outline[0], bgr("danger"))
-    painter.box(np.concatenate([outline.min(axis=0), outline.max(axis=0)]), bgr("danger"), dashed=dashed)
+    painter.dot(outline[0].tolist(), bgr("danger"))
+    painter.box([*outline.min(axis=0), *outline.max(axis=0)], bgr("danger"), dashed=dashed)
     painter.label("far", [(x, y) for x, y in points])
     assert canvas.any()
 

@@ -141,9 +141,10 @@ class Camera:
             jacobian: (N, 2, 2) of the distortion there.
         """
         with np.errstate(invalid="ignore", over="ignore"):
-            determinant = jacobian[:, 0, 0] * jacobian[:, 1, 1] - jacobian[:, 0, 1] * jacobian[:, 1, 0]
-            grows = (determinant > 0) & (jacobian[:, 0, 0] + jacobian[:, 1, 1] > 0)
-            unfolded: BoolArray = grows & ((normalised**2).sum(axis=1) < self.first_fold_r2())
+            (xx, xy), (yx, yy) = jacobian.transpose(1, 2, 0)
+            x, y = normalised.T
+            grows = (xx * yy - xy * yx > 0) & (xx + yy > 0)
+            unfolded: BoolArray = grows & (x * x + y * y < self.first_fold_r2())
         return unfolded
 
     def first_fold_r2(self) -> float:
@@ -189,15 +190,14 @@ class Camera:
             for _ in range(_UNDISTORT_ITERATIONS):
                 distorted, jacobian = self.distorted_with_jacobian(estimate)
                 error = distorted - wanted
-                if not np.isfinite(error).any() or np.nanmax(np.abs(error)) < _UNDISTORT_TOLERANCE:
+                # NaN where nothing has an inverse.
+                if not np.fmax.reduce(np.abs(error), axis=None, initial=0.0) >= _UNDISTORT_TOLERANCE:
                     break
-                determinant = jacobian[:, 0, 0] * jacobian[:, 1, 1] - jacobian[:, 0, 1] * jacobian[:, 1, 0]
-                estimate = estimate - np.column_stack(
-                    [
-                        (jacobian[:, 1, 1] * error[:, 0] - jacobian[:, 0, 1] * error[:, 1]) / determinant,
-                        (jacobian[:, 0, 0] * error[:, 1] - jacobian[:, 1, 0] * error[:, 0]) / determinant,
-                    ]
-                )
+                (xx, xy), (yx, yy) = jacobian.transpose(1, 2, 0)
+                off_x, off_y = error.T
+                determinant = xx * yy - xy * yx
+                estimate[:, 0] -= (yy * off_x - xy * off_y) / determinant
+                estimate[:, 1] -= (xx * off_y - yx * off_x) / determinant
             distorted, jacobian = self.distorted_with_jacobian(estimate)
             found = self._unfolded(estimate, jacobian) & (np.abs(distorted - wanted).max(axis=1, initial=0.0) < 1e-9)
         estimate[~found] = np.nan

@@ -29,16 +29,14 @@ def bent_by_brown(normalised: FloatArray, coefficients: FloatArray) -> tuple[Flo
     r2 = x * x + y * y
     radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
     slope = k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3)
-    bent = np.column_stack(
-        [
-            x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
-            y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
-        ]
-    )
-    jacobian = np.empty((len(x), 2, 2))
-    jacobian[:, 0, 0] = radial + 2.0 * x * x * slope + 2.0 * p1 * y + 6.0 * p2 * x
-    jacobian[:, 0, 1] = jacobian[:, 1, 0] = 2.0 * x * y * slope + 2.0 * p1 * x + 2.0 * p2 * y
-    jacobian[:, 1, 1] = radial + 2.0 * y * y * slope + 6.0 * p1 * y + 2.0 * p2 * x
+    x2, y2 = 2.0 * x, 2.0 * y
+    xx2, xy2, yy2, p1x2, p2x2 = x2 * x, x2 * y, y2 * y, 2.0 * p1 * x, 2.0 * p2 * x
+    bent, jacobian = np.empty((len(x), 2)), np.empty((len(x), 2, 2))
+    bent[:, 0] = x * radial + p1x2 * y + p2 * (r2 + xx2)
+    bent[:, 1] = y * radial + p1 * (r2 + yy2) + p2x2 * y
+    jacobian[:, 0, 0] = radial + xx2 * slope + p1 * y2 + 6.0 * p2 * x
+    jacobian[:, 0, 1] = jacobian[:, 1, 0] = xy2 * slope + p1x2 + p2 * y2
+    jacobian[:, 1, 1] = radial + yy2 * slope + 6.0 * p1 * y + p2x2
     return bent, jacobian
 
 

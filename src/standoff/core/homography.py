@@ -18,11 +18,6 @@ FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 
 
-def _denominators(matrix: FloatArray, points: FloatArray) -> FloatArray:
-    w: FloatArray = points @ matrix[2, :2] + matrix[2, 2]
-    return w
-
-
 def apply(matrix: FloatArray, points: FloatArray) -> tuple[FloatArray, BoolArray]:
     """Map points through a homography.
 
@@ -40,16 +35,22 @@ def apply(matrix: FloatArray, points: FloatArray) -> tuple[FloatArray, BoolArray
     >>> apply(np.diag([2.0, 2.0, 1.0]), np.array([[1.0, 3.0]]))[0]
     array([[2., 6.]])
     """
-    points = np.asarray(points, dtype=np.float64).reshape(-1, 2)
-    points = np.where(np.isfinite(points), points, np.nan)
-    w = _denominators(matrix, points)
-    valid = w > 0
-    safe_w = np.where(valid, w, np.nan)
-    with np.errstate(invalid="ignore", over="ignore"):
-        mapped = (points @ matrix[:2, :2].T + matrix[:2, 2]) / safe_w[:, None]
-    valid &= np.isfinite(mapped).all(axis=1)
-    mapped[~valid] = np.nan
+    mapped, _, valid = _applied(matrix, points)
     return mapped, valid
+
+
+def _applied(matrix: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Return what `apply` does, and between the two the (N,) denominators; NaN beyond the horizon."""
+    points = np.asarray(points, dtype=np.float64).reshape(-1, 2)
+    with np.errstate(invalid="ignore", over="ignore"):
+        w = points @ matrix[2, :2] + matrix[2, 2]
+        w = np.where(w > 0, w, np.nan)
+        mapped = (points @ matrix[:2, :2].T + matrix[:2, 2]) / w[:, None]
+    # Of a point that is not finite the sums are not, or their quotient is not.
+    finite = np.isfinite(mapped)
+    valid: BoolArray = finite[:, 0] & finite[:, 1]
+    mapped[~valid] = np.nan
+    return mapped, w, valid
 
 
 def invert(matrix: FloatArray) -> FloatArray:
@@ -75,7 +76,7 @@ def signed(matrix: FloatArray, point_in_front: FloatArray) -> FloatArray:
     np.True_
     """
     matrix = matrix / np.linalg.norm(matrix)
-    w = float(_denominators(matrix, np.asarray(point_in_front, dtype=np.float64)[None])[0])
+    w = float(matrix[2, :2] @ np.asarray(point_in_front, dtype=np.float64) + matrix[2, 2])
     return matrix if w > 0 else -matrix
 
 
@@ -93,11 +94,28 @@ def point_jacobian(matrix: FloatArray, points: FloatArray) -> FloatArray:
     array([[2., 0.],
            [0., 3.]])
     """
-    points = np.asarray(points, dtype=np.float64).reshape(-1, 2)
-    mapped, valid = apply(matrix, points)
-    w = np.where(valid, _denominators(matrix, points), np.nan)
+    mapped, w, _ = _applied(matrix, points)
     jacobian: FloatArray = (matrix[None, :2, :2] - mapped[:, :, None] * matrix[2, :2]) / w[:, None, None]
     return jacobian
+
+
+def stretches(jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return how long a step of one becomes under each linear map, at most and at least: its singular values.
+
+    Args:
+        jacobian: (N, 2, 2).
+
+    Returns:
+        (N,) and (N,); NaN where the map is.
+
+    >>> stretches(np.array([[[0.0, -3.0], [2.0, 0.0]]]))
+    (array([3.]), array([2.]))
+    """
+    (a, b), (c, d) = jacobian.transpose(1, 2, 0)
+    longest: FloatArray = (np.hypot(a + d, b - c) + np.hypot(a - d, b + c)) / 2.0
+    # The difference of the two would cancel.
+    shortest: FloatArray = np.abs(a * d - b * c) / np.where(longest > 0.0, longest, 1.0)
+    return longest, shortest
 
 
 def parameter_jacobian(matrix: FloatArray, points: FloatArray) -> FloatArray:
@@ -111,9 +129,11 @@ def parameter_jacobian(matrix: FloatArray, points: FloatArray) -> FloatArray:
         (N, 2, 9); NaN where the point is invalid.
     """
     points = np.asarray(points, dtype=np.float64).reshape(-1, 2)
-    mapped, valid = apply(matrix, points)
-    points = np.where(valid[:, None], points, np.nan)
-    over_w = np.column_stack([points, np.ones(len(points))]) / _denominators(matrix, points)[:, None]
+    points = np.asarray(points, dtype=np.float64).reshape(-1, 2)
+    mapped, w, valid = _applied(matrix, points)
+    over_w = np.ones((len(points), 3))
+    over_w[:, :2] = np.where(valid[:, None], points, np.nan)
+    over_w /= w[:, None]
     jacobian = np.zeros((len(points), 2, 9))
     jacobian[:, 0, 0:3] = over_w
     jacobian[:, 1, 3:6] = over_w

@@ -79,10 +79,11 @@ class WatchedGround:
     @property
     def unwatched(self) -> dict[str, float]:
         """Part of the picture's ground by the reason why it is not watched, largest first."""
-        numbers, counts = np.unique(self.cells[self.cells > WATCHED], return_counts=True)
-        ground = max(np.count_nonzero(self.cells != NO_GROUND), 1)
-        order = np.argsort(-counts, kind="stable")
-        return {REASONS[numbers[k]]: float(counts[k] / ground) for k in order}
+        counts = np.bincount(self.cells.ravel() - NO_GROUND)
+        ground = max(counts[WATCHED - NO_GROUND :].sum(), 1)
+        unwatched = counts[WATCHED + 1 - NO_GROUND :]
+        order = np.argsort(-unwatched, kind="stable")
+        return {REASONS[WATCHED + 1 + k]: float(unwatched[k] / ground) for k in order.tolist() if unwatched[k]}
 
     @property
     def missed_share(self) -> float:

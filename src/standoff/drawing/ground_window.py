@@ -141,8 +141,8 @@ def rectify(picture: ImageArray, ground: GroundMap, window: GroundWindow, onto: 
             borderMode=cv2.BORDER_TRANSPARENT,
         )
     else:
-        x_px, y_px = _picture_points(ground, window_to_ground, image_to_picture, onto.shape[:2])
-        cv2.remap(picture, x_px, y_px, cv2.INTER_LINEAR, dst=onto, borderMode=cv2.BORDER_TRANSPARENT)
+        at_px = _picture_points(ground, window_to_ground, image_to_picture, onto.shape[:2])
+        cv2.remap(picture, at_px, None, cv2.INTER_LINEAR, dst=onto, borderMode=cv2.BORDER_TRANSPARENT)
     if behind is not None:
         onto[behind] = backdrop[behind]
 
@@ -163,8 +163,8 @@ def _behind_camera(window_to_image: FloatArray, size_px: tuple[int, int]) -> Boo
 
 def _picture_points(
     ground: GroundMap, window_to_ground: FloatArray, image_to_picture: FloatArray, shape: tuple[int, ...]
-) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
-    """Return x and y, (h, w) each, of where every window pixel lies in the picture.
+) -> npt.NDArray[np.float32]:
+    """Return (h, w, 2) where every window pixel lies in the picture.
 
     Only a coarse grid goes through the lens; between its points the lens is as good as linear for the eye.
     """
@@ -174,9 +174,17 @@ def _picture_points(
     at_image_px, seen = ground.to_image(homography.apply(window_to_ground, np.column_stack([x.ravel(), y.ravel()]))[0])
     at_image_px[~seen] = 0.0
     at_px, _ = homography.apply(image_to_picture, at_image_px)
-    grid = np.column_stack([at_px, seen]).reshape(rows, columns, 3).astype(np.float32)
+    grid = at_px if seen.all() else np.column_stack([at_px, seen])
     # warpAffine with the step as scale keeps grid points on their pixels; cv2.resize would shift them by half a step.
     scale = np.array([[_LENS_STEP_PX, 0.0, 0.0], [0.0, _LENS_STEP_PX, 0.0]])
-    dense = cv2.warpAffine(grid, scale, (width, height), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    dense: npt.NDArray[np.float32] = cv2.warpAffine(
+        grid.reshape(rows, columns, -1).astype(np.float32),
+        scale,
+        (width, height),
+        flags=cv2.INTER_LINEAR,
+        borderMode=cv2.BORDER_REPLICATE,
+    )
+    if dense.shape[2] == 2:
+        return dense
     dense[dense[:, :, 2] < 1.0] = _OUTSIDE_PX
-    return np.ascontiguousarray(dense[:, :, 0]), np.ascontiguousarray(dense[:, :, 1])
+    return np.ascontiguousarray(dense[:, :, :2])

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
+from standoff.core.compiled import compiled
 from standoff.core.homography import FloatArray
 from standoff.core.types import ImageArray
 from standoff.drawing.palette import Bgr, bgr
@@ -38,33 +40,35 @@ class Painter:
         self.font_px: int = max(11, round(height / 54))
         self._taken: list[Rectangle] = []
 
-    def shows(self, xyxy_px: FloatArray) -> bool:
+    def shows(self, xyxy_px: Sequence[float]) -> bool:
         """Return whether a part of a box lies on the canvas."""
         height, width = self._canvas.shape[:2]
         x1, y1, x2, y2 = xyxy_px
-        return bool(x1 < width and y1 < height and x2 > 0 and y2 > 0)
+        return x1 < width and y1 < height and x2 > 0 and y2 > 0
 
     def line(self, points_px: FloatArray, colour: Bgr, *, dashed: bool = False) -> None:
         """Draw a curve through (N, 2) points without sharp corners, or any polyline in dashes."""
         if dashed:
-            self._strokes(_dashes(points_px, self.stroke_px), colour, self.stroke_px)
+            self._strokes(_dashes(points_px, self.stroke_px), (colour, self.stroke_px))
         elif np.isfinite(points_px).all():
-            strip = _fixed_point(_strip(points_px, self.stroke_px))
-            cv2.fillPoly(self._canvas, [strip], colour, cv2.LINE_AA, _SHIFT)
+            cv2.fillPoly(self._canvas, [_strip(points_px, self.stroke_px)], colour, cv2.LINE_AA, _SHIFT)
 
     def cased_line(self, points_px: FloatArray, colour: Bgr, *, dashed: bool = False) -> None:
         """Draw a polyline with a dark edge, to be seen on any ground."""
         strokes = _dashes(points_px, self.stroke_px) if dashed else points_px[None]
-        self._strokes(strokes, bgr("dark"), self.stroke_px + 2)
-        self._strokes(strokes, colour, self.stroke_px)
+        self._strokes(strokes, (bgr("dark"), self.stroke_px + 2), (colour, self.stroke_px))
 
-    def _strokes(self, strokes_px: FloatArray, colour: Bgr, width_px: int) -> None:
-        if strokes_px.size and np.isfinite(strokes_px).all():
-            cv2.polylines(self._canvas, list(_fixed_point(strokes_px)), False, colour, width_px, cv2.LINE_AA, _SHIFT)
+    def _strokes(self, strokes_px: FloatArray, *pens: tuple[Bgr, int]) -> None:
+        """Draw polylines (K, P, 2) with one pen after another, each a colour and a width."""
+        if not strokes_px.size or not np.isfinite(strokes_px).all():
+            return
+        strokes = list(_fixed_point(strokes_px))
+        for colour, width_px in pens:
+            cv2.polylines(self._canvas, strokes, False, colour, width_px, cv2.LINE_AA, _SHIFT)
 
-    def box(self, xyxy_px: FloatArray, colour: Bgr, *, dashed: bool = False) -> None:
+    def box(self, xyxy_px: Sequence[float], colour: Bgr, *, dashed: bool = False) -> None:
         """Draw a rectangle."""
-        x1, y1, x2, y2 = np.clip(xyxy_px, -_FAR_PX, _FAR_PX)
+        x1, y1, x2, y2 = (min(max(edge_px, -_FAR_PX), _FAR_PX) for edge_px in xyxy_px)
         if dashed:
             self.line(np.array([[x1, y1], [x2, y1], [x2, y2], [x1, y2], [x1, y1]]), colour, dashed=True)
             return
@@ -72,11 +76,12 @@ class Painter:
         cv2.rectangle(self._canvas, *corners, bgr("dark"), self.stroke_px + 2)
         cv2.rectangle(self._canvas, *corners, colour, self.stroke_px)
 
-    def dot(self, point_px: FloatArray, colour: Bgr, *, hollow: bool = False) -> None:
+    def dot(self, point_px: Sequence[float], colour: Bgr, *, hollow: bool = False) -> None:
         """Draw a small disc with a dark edge."""
-        if not np.isfinite(point_px).all():
+        x, y = point_px
+        if not (math.isfinite(x) and math.isfinite(y)):
             return
-        centre = tuple(_fixed_point(point_px).ravel().tolist())
+        centre = tuple(round(min(max(one_px, -_FAR_PX), _FAR_PX) * (1 << _SHIFT)) for one_px in (x, y))
         radius = (2 + self.stroke_px) << _SHIFT
         cv2.circle(self._canvas, centre, radius + (1 << _SHIFT), bgr("dark"), -1, cv2.LINE_AA, _SHIFT)
         thickness = self.stroke_px if hollow else -1
@@ -127,12 +132,11 @@ class Painter:
             optional: Leave the label out when there is no free place, instead of covering another.
         """
         size = self.label_size_px(text, bold=bold)
-        places = (self._inside(corner, size) for corner in corners_px)
-        free = next((place for place in places if not self._is_taken(place)), None)
-        if free is None and optional:
+        place = self._free_place(corners_px, size)
+        if place is None and optional:
             return
-        x0, y0, x1, y1 = free or self._inside(corners_px[0], size)
-        self._taken.append((x0, y0, x1, y1))
+        x0, y0, x1, y1 = place = place or self._inside(corners_px[0], size)
+        self._taken.append(place)
         area = self._canvas[y0:y1, x0:x1]
         cv2.convertScaleAbs(area, dst=area, alpha=0.28, beta=14)
         if accent is not None:
@@ -153,18 +157,36 @@ class Painter:
         y0 = int(min(max(corner_px[1], 0), max(height - size_px[1], 0)))
         return x0, y0, min(x0 + size_px[0], width), min(y0 + size_px[1], height)
 
-    def _is_taken(self, place: Rectangle) -> bool:
-        x0, y0, x1, y1 = place
-        return any(x0 < right and left < x1 and y0 < bottom and top < y1 for left, top, right, bottom in self._taken)
+    def _free_place(self, corners_px: Sequence[tuple[float, float]], size_px: tuple[int, int]) -> Rectangle | None:
+        """Return the first place of a label that covers no earlier one; None where all do."""
+        for corner_px in corners_px:
+            x0, y0, x1, y1 = place = self._inside(corner_px, size_px)
+            for left, top, right, bottom in self._taken:
+                if x0 < right and left < x1 and y0 < bottom and top < y1:
+                    break
+            else:
+                return place
+        return None
 
 
-def _strip(points_px: FloatArray, width_px: float) -> FloatArray:
-    """Return the outline of a curve's stroke: filled in one go, it costs half of cv2.polylines with its many joints."""
-    chords = np.diff(points_px, axis=0)
-    along = np.concatenate([chords[:1], chords[:-1] + chords[1:], chords[-1:]])
-    lengths = np.sqrt((along * along).sum(axis=1, keepdims=True))
-    aside = 0.5 * width_px * along[:, ::-1] * (1.0, -1.0) / np.maximum(lengths, 1e-9)
-    return np.concatenate([points_px + aside, (points_px - aside)[::-1]])
+@compiled
+def _strip(points_px: FloatArray, width_px: float) -> npt.NDArray[np.int32]:
+    """Return the outline of the stroke of a curve (N, 2) in fixed point, (2 N, 2): up one side, back down the other.
+
+    Filled in one go, it costs half of cv2.polylines with its many joints.
+    """
+    count = len(points_px)
+    strip = np.empty((2 * count, 2), dtype=np.int32)
+    for i in range(count):
+        along_x = points_px[min(i + 1, count - 1), 0] - points_px[max(i - 1, 0), 0]
+        along_y = points_px[min(i + 1, count - 1), 1] - points_px[max(i - 1, 0), 1]
+        length = max(math.sqrt(along_x * along_x + along_y * along_y), 1e-9)
+        aside_x, aside_y = 0.5 * width_px * along_y / length, -0.5 * width_px * along_x / length
+        for place, sign in ((i, 1.0), (2 * count - 1 - i, -1.0)):
+            x, y = points_px[i, 0] + sign * aside_x, points_px[i, 1] + sign * aside_y
+            strip[place, 0] = round(min(max(x, -_FAR_PX), _FAR_PX) * (1 << _SHIFT))
+            strip[place, 1] = round(min(max(y, -_FAR_PX), _FAR_PX) * (1 << _SHIFT))
+    return strip
 
 
 def _dashes(points_px: FloatArray, stroke_px: int) -> FloatArray:

@@ -212,14 +212,21 @@ def monitor_workload(
             proximity=ProximityMeter(),
             hazard=HazardMonitor(),
         )
-        return collect_times(Run(SiteFilm(site, frames), monitor, _sinks(Path(folder))))
+        return collect_times(Run(SiteFilm(site, frames), monitor, workload_sinks(Path(folder))))
 
 
-def _sinks(folder: Path) -> dict[str, Sink]:
+def workload_sinks(folder: Path, *, film: bool = True) -> dict[str, Sink]:
+    """Return what a run writes by default, the film drawn but not encoded, by name.
+
+    Args:
+        folder: Where the files go.
+        film: False: no film is drawn.
+    """
     tables = {"tracks": TRACKS, "proximity": PROXIMITY, "frames": FRAMES}
     sinks: dict[str, Sink] = {name: TableSink(folder / f"{name}.parquet", table) for name, table in tables.items()}
+    drawing: dict[str, Sink] = {"drawing": DrawingSink()} if film else {}
     return sinks | {
         "hazards": HazardSink(folder / "hazards.jsonl"),
-        "drawing": DrawingSink(),
+        **drawing,
         "report": ReportSink(folder / "report.html"),
     }

@@ -66,7 +66,10 @@ class Scaler:
             if shrinks and mildly and frame.format.name in _EIGHT_BIT_420:
                 frame = self._reformatted(frame, width_px, height_px, frame.format.name)
             scaled = self._reformatted(frame, width_px, height_px, "bgr24")
-        return np.asarray(scaled.to_ndarray(), dtype=np.uint8)
+        # As it lies in the frame, rows perhaps padded: to_ndarray() would copy it.
+        plane = scaled.planes[0]
+        rows = np.frombuffer(plane, np.uint8).reshape(height_px, plane.line_size)
+        return rows[:, : 3 * width_px].reshape(height_px, width_px, 3)
 
     def _reformatted(self, frame: av.VideoFrame, width_px: int, height_px: int, pixel_format: str) -> av.VideoFrame:
         shrinks = width_px * height_px < frame.width * frame.height

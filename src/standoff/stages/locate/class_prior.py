@@ -72,6 +72,6 @@ def sines_of_view(ground: GroundMap, undistorted_px: FloatArray) -> FloatArray:
     sines: FloatArray = np.full(len(undistorted_px), np.nan)
     jacobian = homography.point_jacobian(ground.image_to_ground, undistorted_px)
     usable = np.isfinite(jacobian).all(axis=(1, 2)) & homography.apply(ground.image_to_ground, undistorted_px)[1]
-    longest, shortest = np.linalg.svd(jacobian[usable], compute_uv=False).T.reshape(2, -1)
+    longest, shortest = homography.stretches(jacobian[usable])
     sines[usable] = shortest / longest
     return sines

@@ -93,7 +93,7 @@ class BirdsEye:
         radii_px = sketch.scene.positions.radius_m / window.m_per_px
         observed = sketch.scene.tracks.observed
         if self._params.circles:
-            for i in np.flatnonzero(placed):
+            for i in np.flatnonzero(placed).tolist():
                 outline = at[i] + radii_px[i] * _CIRCLE
                 if sketch.tones[i] in ("danger", "warning"):
                     painter.fill(outline, bgr(sketch.tones[i]), 0.2)
@@ -105,20 +105,20 @@ class BirdsEye:
             ends = [line.row_a, line.row_b]
             if placed[ends].all():
                 painter.cased_line(at[ends], bgr(line.tone), dashed=line.dashed)
-        for i in np.flatnonzero(placed):
-            painter.dot(at[i], bgr(sketch.tones[i]), hollow=not observed[i])
+        for i in np.flatnonzero(placed).tolist():
+            painter.dot(at[i].tolist(), bgr(sketch.tones[i]), hollow=not observed[i])
         if self._params.labels:
             _label_dots(painter, sketch, at, placed)
 
 
 def _label_dots(painter: Painter, sketch: Sketch, at_px: FloatArray, placed: BoolArray) -> None:
-    for i in np.flatnonzero(placed):
+    for i in np.flatnonzero(placed).tolist():
         text = str(sketch.scene.tracks.track_id[i])
         width, height = painter.label_size_px(text)
-        x, y = at_px[i]
+        x, y = at_px[i].tolist()
         gap = 6 + 2 * painter.stroke_px
         corners = [(x + gap, y - height / 2), (x - gap - width, y - height / 2), (x - width / 2, y + gap)]
-        if painter.shows(np.array([x, y, x, y])):
+        if painter.shows((x, y, x, y)):
             painter.label(text, corners, accent=bgr(sketch.tones[i]), optional=True)
 
 

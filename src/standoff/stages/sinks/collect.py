@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -107,9 +107,10 @@ class RunSummary:
         self._add_ground(frame, scene)
         # Of frames that share a sample the one with the least share is kept, as is the closest of a pair.
         self.watched_share.add(frame.time_s, result.watched.share, float("nan"), float("nan"))
-        self._add_paths(scene)
-        self._add_pairs(scene)
-        self._add_hazards(result.hazards, scene)
+        names = scene.names()
+        self._add_paths(scene, names)
+        self._add_pairs(scene, names)
+        self._add_hazards(result.hazards, scene, names)
         self.moments.offer(frame, scene)
         measured = np.flatnonzero(np.isfinite(pairs.gap_m))
         if len(measured):
@@ -133,19 +134,19 @@ class RunSummary:
             blur(picture, scene.hidden_px, np.array([0.0, 0.0, *frame.size_px]))
             self.background = (picture, ground)
 
-    def _add_paths(self, scene: Scene) -> None:
-        names = scene.names()
-        rows = zip(scene.tracks.track_id.tolist(), scene.tracks.class_id.tolist(), scene.positions.xy_m, strict=True)
+    def _add_paths(self, scene: Scene, names: Mapping[int, str]) -> None:
+        tracks, xy_m = scene.tracks, scene.positions.xy_m.tolist()
+        rows = zip(tracks.track_id.tolist(), tracks.class_id.tolist(), xy_m, strict=True)
         for track_id, class_id, (x_m, y_m) in rows:
             if track_id not in self.paths:
                 self.paths[track_id] = Trail(names[track_id], class_id)
-            self.paths[track_id].add(float(x_m), float(y_m))
+            self.paths[track_id].add(x_m, y_m)
         if len(self.paths) > 2 * _MOST_PATHS:
             longest = sorted(self.paths, key=lambda track_id: len(self.paths[track_id]), reverse=True)
             self.paths = {track_id: self.paths[track_id] for track_id in sorted(longest[:_MOST_PATHS])}
 
-    def _add_pairs(self, scene: Scene) -> None:
-        pairs, names = scene.proximities, scene.names()
+    def _add_pairs(self, scene: Scene, names: Mapping[int, str]) -> None:
+        pairs = scene.proximities
         keys = zip(pairs.track_a.tolist(), pairs.track_b.tolist(), strict=True)
         numbers = zip(pairs.gap_m.tolist(), pairs.distance_m.tolist(), pairs.sigma_m.tolist(), strict=True)
         for key, (gap_m, distance_m, sigma_m) in zip(keys, numbers, strict=True):
@@ -177,8 +178,7 @@ class RunSummary:
         closest = self.pairs[pair].closest
         return closest.gap_m if closest else float("inf")
 
-    def _add_hazards(self, events: Iterable[Hazard], scene: Scene) -> None:
-        names = scene.names()
+    def _add_hazards(self, events: Iterable[Hazard], scene: Scene, names: Mapping[int, str]) -> None:
         for event in events:
             if event.hazard_id not in self.hazards and len(self.hazards) < _MOST_HAZARDS:
                 called = tuple(names.get(track_id, f"track {track_id}") for track_id in event.track_ids)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from standoff.core.homography import FloatArray
@@ -103,7 +105,7 @@ def _draw_banner(painter: Painter, canvas: ImageArray, text: str) -> None:
     bar[:] = (bar * 0.12 + np.array(bgr("danger")) * 0.7).astype(np.uint8)
     painter.reserve((0, 0, width, len(bar)))
     painter.title(text, (painter.font_px, round(0.6 * painter.font_px)))
-    painter.box(np.array([1, 1, width - 2, height - 2]), bgr("danger"))
+    painter.box((1, 1, width - 2, height - 2), bgr("danger"))
 
 
 def _draw_anchors(painter: Painter, to_canvas: _ToCanvas, ground: GroundMap) -> None:
@@ -112,7 +114,7 @@ def _draw_anchors(painter: Painter, to_canvas: _ToCanvas, ground: GroundMap) -> 
     anchors = to_canvas(ground.anchors_px)
     if len(anchors) == 4:
         painter.cased_line(np.vstack([anchors, anchors[:1]]), bgr("reference"), dashed=ground.age_s > 0)
-    for anchor in anchors:
+    for anchor in anchors.tolist():
         painter.dot(anchor, bgr("reference"), hollow=ground.age_s > 0)
 
 
@@ -128,17 +130,23 @@ def _draw_circles(painter: Painter, to_canvas: _ToCanvas, sketch: Sketch, ground
 
 
 def _draw_fans(painter: Painter, to_canvas: _ToCanvas, sketch: Sketch, ground: GroundMap) -> None:
-    for fan in sketch.fans:
-        (path_px, path_seen), (outline_px, outline_seen) = ground.to_image(fan.path_m), ground.to_image(fan.outline_m)
-        if path_seen.all() and outline_seen.all():
-            painter.fill(to_canvas(outline_px), bgr(sketch.tones[fan.row]), FAN_OPACITY)
-            painter.line(to_canvas(path_px), bgr(sketch.tones[fan.row]))
+    if not sketch.fans:
+        return
+    # All at once: a map with a lens costs by the call.
+    curves_m = [curve_m for fan in sketch.fans for curve_m in (fan.outline_m, fan.path_m)]
+    points_px, seen = ground.to_image(np.concatenate(curves_m))
+    ends = np.cumsum([len(curve_m) for curve_m in curves_m])[:-1]
+    curves_px, all_seen = np.split(to_canvas(points_px), ends), [part.all() for part in np.split(seen, ends)]
+    for k, fan in enumerate(sketch.fans):
+        if all_seen[2 * k] and all_seen[2 * k + 1]:
+            painter.fill(curves_px[2 * k], bgr(sketch.tones[fan.row]), FAN_OPACITY)
+            painter.line(curves_px[2 * k + 1], bgr(sketch.tones[fan.row]))
 
 
 def _draw_boxes(painter: Painter, to_canvas: _ToCanvas, sketch: Sketch) -> None:
     tracks = sketch.scene.tracks
     corners = to_canvas(tracks.xyxy_px).reshape(-1, 4)
-    for xyxy, tone, observed in zip(corners, sketch.tones, tracks.observed, strict=True):
+    for xyxy, tone, observed in zip(corners.tolist(), sketch.tones, tracks.observed, strict=True):
         painter.box(xyxy, bgr(tone), dashed=not observed)
 
 
@@ -146,29 +154,29 @@ def _draw_lines(painter: Painter, to_canvas: _ToCanvas, sketch: Sketch) -> None:
     feet = to_canvas(sketch.feet_px)
     for line in reversed(sketch.lines):
         painter.cased_line(feet[[line.row_a, line.row_b]], bgr(line.tone), dashed=line.dashed)
-    for foot, tone, observed in zip(feet, sketch.tones, sketch.scene.tracks.observed, strict=True):
+    for foot, tone, observed in zip(feet.tolist(), sketch.tones, sketch.scene.tracks.observed, strict=True):
         painter.dot(foot, bgr(tone), hollow=not observed)
 
 
 def _label_lines(painter: Painter, to_canvas: _ToCanvas, sketch: Sketch) -> None:
-    feet = to_canvas(sketch.feet_px)
+    feet = to_canvas(sketch.feet_px).tolist()
     for line in sketch.lines:
-        ends = feet[[line.row_a, line.row_b]]
-        if not painter.shows(np.concatenate([ends.min(axis=0), ends.max(axis=0)])):
+        (x0, y0), (x1, y1) = feet[line.row_a], feet[line.row_b]
+        if not painter.shows((min(x0, x1), min(y0, y1), max(x0, x1), max(y0, y1))):
             continue
         width, height = painter.label_size_px(line.text, bold=True)
-        along = ends[1] - ends[0]
-        spots = [ends[0] + share * along for share in (0.5, 0.35, 0.65)]
+        along_x, along_y = x1 - x0, y1 - y0
+        spots = [(x0 + share * along_x, y0 + share * along_y) for share in (0.5, 0.35, 0.65)]
         on_line = [(x - width / 2, y - height / 2) for x, y in spots]
         beside = [(x - width / 2, y + sign * 1.2 * height - height / 2) for x, y in spots for sign in (1, -1)]
-        is_short = float(np.linalg.norm(along)) < 1.5 * width
+        is_short = math.hypot(along_x, along_y) < 1.5 * width
         corners = beside + on_line if is_short else on_line + beside
         painter.label(line.text, corners, accent=bgr(line.tone), bold=True, optional=line.tone != "danger")
 
 
 def _label_boxes(painter: Painter, to_canvas: _ToCanvas, sketch: Sketch) -> None:
     scene, tones = sketch.scene, sketch.tones
-    corners = to_canvas(scene.tracks.xyxy_px).reshape(-1, 4)
+    corners = to_canvas(scene.tracks.xyxy_px).reshape(-1, 4).tolist()
     remarks = scene.zone_words(), scene.around_words()
     names = [
         ", ".join([name, *(words[track] for words in remarks if track in words)])

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from standoff.core.classes import CLASSES, Role
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.lengths import LengthUnit
+from standoff.core.roles import PERSON_ROLE, ROLE_OF_CLASS
 from standoff.core.types import IntArray
 from standoff.drawing.palette import Tone
 from standoff.stages.sinks.scene import Scene
@@ -52,27 +52,27 @@ def pair_lines(scene: Scene, feet_px: FloatArray, within_m: float, unit: LengthU
     if not len(pairs):
         return []
     row_of = {track_id: row for row, track_id in enumerate(tracks.track_id.tolist())}
-    rows = np.array([[row_of[a], row_of[b]] for a, b in zip(pairs.track_a, pairs.track_b, strict=True)])
+    keys = list(zip(pairs.track_a.tolist(), pairs.track_b.tolist(), strict=True))
+    rows = np.array([(row_of[a], row_of[b]) for a, b in keys])
     measured = np.isfinite(pairs.distance_m)
     apart_px = np.linalg.norm(feet_px[rows[:, 0]] - feet_px[rows[:, 1]], axis=1)
     wanted = _nearest_of_each_owner(rows, tracks.class_id, pairs.distance_m, measured & (pairs.distance_m <= within_m))
     in_sight = apart_px <= _UNMEASURED_WITHIN_SHARE * scene.size_px[0]
     wanted |= _nearest_of_each_owner(rows, tracks.class_id, apart_px, ~measured & in_sight)
-    keys = list(zip(pairs.track_a.tolist(), pairs.track_b.tolist(), strict=True))
     wanted |= np.array([key in scene.hazards for key in keys])
     lines = [_line(scene, k, keys[k], rows[k], unit) for k in np.flatnonzero(wanted).tolist()]
     return sorted(lines, key=lambda line: _RANK[line.tone])
 
 
 def _nearest_of_each_owner(rows: IntArray, class_id: IntArray, apart: FloatArray, eligible: BoolArray) -> BoolArray:
-    is_person = np.array([CLASSES[c].role is Role.PERSON for c in class_id.tolist()])
-    owns = is_person[rows]
+    owns = ROLE_OF_CLASS[class_id[rows]] == PERSON_ROLE
     owns[~owns.any(axis=1)] = True
     nearest = np.zeros(len(rows), dtype=bool)
-    order = [k for k in np.argsort(apart, kind="stable") if eligible[k]]
+    order = np.argsort(apart, kind="stable")
+    ends, owning = rows.tolist(), owns.tolist()
     seen: set[int] = set()
-    for k in order:
-        owners = set(rows[k][owns[k]].tolist()) - seen
+    for k in order[eligible[order]].tolist():
+        owners = {row for row, owner in zip(ends[k], owning[k], strict=True) if owner and row not in seen}
         nearest[k] = bool(owners)
         seen |= owners
     return nearest

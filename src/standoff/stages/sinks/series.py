@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -62,7 +63,7 @@ class Series:
 
     def add(self, time_s: float, gap_m: float, distance_m: float, sigma_m: float) -> None:
         """Add a frame; NaN where nothing was measured."""
-        missing = not np.isfinite(gap_m)
+        missing = not math.isfinite(gap_m)
         sample = Sample(time_s, time_s, time_s, gap_m, distance_m, sigma_m, unmeasured=int(missing))
         if not missing and (self.closest is None or gap_m < self.closest.gap_m):
             self.closest = sample
@@ -112,7 +113,7 @@ class Trail:
     def add(self, x_m: float, y_m: float) -> None:
         """Add a frame's position; NaN where it is unknown."""
         self._seen += 1
-        if self._seen % self._every == 0 or (np.isnan(x_m) and self._points and not np.isnan(self._points[-1][0])):
+        if self._seen % self._every == 0 or (math.isnan(x_m) and self._points and not math.isnan(self._points[-1][0])):
             self._points.append((x_m, y_m))
         if len(self._points) > self._capacity:
             points = self.points_m

@@ -53,6 +53,7 @@ class Shade:
         self.size_px = size_px
         self._lines = diagonals(size_px)
         self._parts: tuple[bytes, ...] = ()
+        self._there = slice(0), slice(0)
         self._darker = self._lighter = np.zeros((0, 0, 3), dtype=np.uint8)
 
     def draw(self, canvas: ImageArray, parts: tuple[bytes, ...], opacity: Callable[[], Opacity]) -> None:
@@ -65,12 +66,16 @@ class Shade:
         """
         if parts != self._parts:
             self._parts, there = parts, opacity()
+            left, top, wide, high = cv2.boundingRect(there)
+            self._there = slice(top, top + high), slice(left, left + wide)
+            there, lines = there[self._there], self._lines[self._there]
             darker = cv2.convertScaleAbs(there, alpha=_DARKER / 255.0)
-            lighter = cv2.convertScaleAbs(cv2.bitwise_and(there, self._lines), alpha=(_DARKER + _LIGHTER) / 255.0)
+            lighter = cv2.convertScaleAbs(cv2.bitwise_and(there, lines), alpha=(_DARKER + _LIGHTER) / 255.0)
             self._darker, self._lighter = (np.asarray(cv2.merge([one] * 3)) for one in (darker, lighter))
         # Dark ground shows the lines, bright ground the shade; both operations saturate, and cost a tenth of a blend.
-        cv2.subtract(canvas, self._darker, dst=canvas)
-        cv2.add(canvas, self._lighter, dst=canvas)
+        marked = canvas[self._there]
+        cv2.subtract(marked, self._darker, dst=marked)
+        cv2.add(marked, self._lighter, dst=marked)
 
 
 class PictureShade:

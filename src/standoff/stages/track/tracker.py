@@ -121,7 +121,8 @@ class Tracker(protocols.Tracker):
         unclaimed = self._associate(detections, places_m, ground)
         self._end_lost()
         new = unclaimed & (detections.score >= self._params.start_score)
-        self._start(detections[new], places_m[new], ground)
+        if new.any():
+            self._start(detections[new], places_m[new], ground)
         self._looked_s = time_s
         return self._report()
 
@@ -169,7 +170,8 @@ class Tracker(protocols.Tracker):
         same_thing = (role[:, None] == role) & (class_id[:, None] != class_id)
         if same_thing.any():
             same_thing &= overlaps(detections.xyxy_px, detections.xyxy_px) >= self._params.duplicate_overlap
-            detections = detections[~np.triu(same_thing, k=1).any(axis=0)]
+            second = np.triu(same_thing, k=1).any(axis=0)
+            detections = detections[~second] if second.any() else detections
         return detections
 
     def _associate(self, detections: Detections, places_m: FloatArray, ground: AnyGround) -> BoolArray:
@@ -247,8 +249,6 @@ class Tracker(protocols.Tracker):
 
     def _start(self, detections: Detections, places_m: FloatArray, ground: AnyGround) -> None:
         count = len(detections)
-        if not count:
-            return
         rows = np.zeros(count, _ROW)
         box_motion.start(rows, box_motion.to_centre(detections.xyxy_px), self._params)
         foot.start(rows)

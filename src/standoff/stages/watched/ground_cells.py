@@ -52,7 +52,7 @@ def ground_cells(ground: GroundMap, size_px: tuple[int, int], stature_m: float) 
     seen_px = points_px[is_ground]
     height_px[is_ground] = _heights_px(ground, seen_px, places_m[is_ground], stature_m)
     moved_m = map_jacobian(ground, seen_px) @ factor(ground.covariance)
-    sigma_m[is_ground] = np.linalg.svd(moved_m, compute_uv=False)[:, 0]
+    sigma_m[is_ground] = np.sqrt(homography.stretches(moved_m @ moved_m.transpose(0, 2, 1))[0])
     in_map = inside(ground.valid_px, points_px) if len(ground.valid_px) else is_ground
     return GroundCells(is_ground, in_map, height_px, sigma_m)
 
@@ -62,7 +62,7 @@ def _heights_px(ground: GroundMap, seen_px: FloatArray, places_m: FloatArray, st
 
     Without a camera the view is taken to be parallel, H sqrt(1 - s^2): right in the middle of the picture.
     """
-    along_m, across_m = np.linalg.svd(picture_jacobian(ground, seen_px), compute_uv=False).T
+    along_m, across_m = homography.stretches(picture_jacobian(ground, seen_px))
     sine = across_m / along_m
     upright_px = stature_m * np.sqrt(1.0 - sine**2) / across_m
     if ground.camera is not None:

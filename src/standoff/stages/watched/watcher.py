@@ -212,7 +212,10 @@ def _usual_near(values: FloatArray) -> FloatArray:
     """Return the median of the three by three parts about each; NaN, where none of them tells, as usual elsewhere."""
     around = np.pad(values, 1, constant_values=np.nan)
     windows = np.lib.stride_tricks.sliding_window_view(around, (3, 3)).reshape(*values.shape, 9)
-    known = np.isfinite(windows).any(axis=2)
-    usual = np.full(values.shape, np.nanmedian(values) if np.isfinite(values).any() else 0.0)
-    usual[known] = np.nanmedian(windows[known], axis=1)
+    told = np.isfinite(windows).sum(axis=2)
+    # Sorted, what is not known comes last.
+    in_order, last = np.sort(windows, axis=2), np.maximum(told - 1, 0)
+    middle = [np.take_along_axis(in_order, k[:, :, None], axis=2)[:, :, 0] for k in (last // 2, (last + 1) // 2)]
+    usual: FloatArray = (middle[0] + middle[1]) / 2.0
+    usual[told == 0] = np.nanmedian(values) if (told > 0).any() else 0.0
     return usual

@@ -73,7 +73,7 @@ def _draw_tile(canvas: ImageArray, tile: Tile, text: TextSprites) -> None:
     picture[:] = tile.image
     painter = Painter(picture, text)
     for xyxy_px, class_id in zip(tile.xyxy_px, tile.class_id.tolist(), strict=True):
-        painter.box(xyxy_px, bgr(class_tone(class_id)))
+        painter.box(xyxy_px.tolist(), bgr(class_tone(class_id)))
     caption = canvas[tile.image.shape[0] :]
     write_light(caption, text.sprite(tile.title, _FONT_PX, bold=True), 2, 3)
     write_light(caption, text.sprite(tile.reason, _FONT_PX), 2, 3 + _CAPTION_PX // 2)
