@@ -93,7 +93,7 @@ class KnownBefore(protocols.Source, protocols.Detector):
     """
 
     def __init__(self, site: Site, frames: int) -> None:
-        self.size_px, self._frames = site.size_px, list(SiteFilm(site, frames).frames())
+        self._site, self._frames = site, list(SiteFilm(site, frames).frames())
         self._detections: list[Detections] = [site.detections(frame.index) for frame in self._frames]
         motion, ground = MotionEstimator(), site.ground("surveyed")
         seen = list(zip(self._frames, self._detections, strict=True))
@@ -101,6 +101,10 @@ class KnownBefore(protocols.Source, protocols.Detector):
         self._maps: list[AnyGround] = [
             ground.update(*one, moved) for one, moved in zip(seen, self._motions, strict=True)
         ]
+
+    @property
+    def size_px(self) -> tuple[int, int]:
+        return self._site.size_px
 
     def frames(self) -> Iterator[Frame]:
         return iter(self._frames)

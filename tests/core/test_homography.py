@@ -250,3 +250,11 @@ def test_stretches_are_the_singular_values_of_a_map(ground_map: FloatArray, seed
     jacobian = jacobian[np.isfinite(jacobian).all(axis=(1, 2))]
     longest, shortest = np.linalg.svd(jacobian, compute_uv=False).T.reshape(2, -1)
     np.testing.assert_allclose(homography.stretches(jacobian), (longest, shortest), rtol=GEOMETRY_REL)
+
+
+@given(st.floats(0.0, 7.0), st.floats(1e-6, 1e6))
+def test_a_turn_stretches_nothing_more_one_way_than_another(angle: float, scale: float) -> None:
+    turn = scale * np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    longest, shortest = homography.stretches(turn[None])
+    assert shortest <= longest
+    np.testing.assert_allclose(shortest, longest, rtol=GEOMETRY_REL)

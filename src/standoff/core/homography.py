@@ -113,8 +113,8 @@ def stretches(jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:
     """
     (a, b), (c, d) = jacobian.transpose(1, 2, 0)
     longest: FloatArray = (np.hypot(a + d, b - c) + np.hypot(a - d, b + c)) / 2.0
-    # The difference of the two would cancel.
-    shortest: FloatArray = np.abs(a * d - b * c) / np.where(longest > 0.0, longest, 1.0)
+    # The difference of the two would cancel; of a turn they are equal, but for rounding.
+    shortest: FloatArray = np.minimum(np.abs(a * d - b * c) / np.where(longest > 0.0, longest, 1.0), longest)
     return longest, shortest
 
 
