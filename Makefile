@@ -2,6 +2,7 @@
 # make test   lint, types, layer contracts and tests: the same examples on every machine
 # make test-live   the tests that need servers or take long, which make test leaves out
 # make test-processors   the numeric tests as older processors would compute; TESTS=... for others
+# make docs   the documentation as a site in site/; a dead link fails
 # make coverage   how much of the packages that run on site their own tests reach
 # make fuzz   the laws with many more examples, and others each time; prints how to repeat a failure
 # All set themselves up on a fresh Debian or Ubuntu with python3 and make.
