@@ -13,7 +13,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from standoff.core.homography import FloatArray
 from standoff.stages.frames import open_source
-from standoff.stages.sinks.palette import HEX
+from standoff.drawing.palette import HEX
 
 FILM = Path(str(files("standoff"))) / "demo"
 FRAME = 100
