@@ -12,8 +12,8 @@ from matplotlib.font_manager import findfont
 from PIL import Image, ImageDraw, ImageFont
 
 from standoff.core.homography import FloatArray
-from standoff.stages.frames import open_source
 from standoff.drawing.palette import HEX
+from standoff.stages.frames import open_source
 
 FILM = Path(str(files("standoff"))) / "demo"
 FRAME = 100

@@ -30,6 +30,8 @@ from standoff.core.errors import StandoffError
 PROJECT = Path(__file__).resolve().parents[2]
 PAGES = (PROJECT / "README.md", *sorted((PROJECT / "docs").glob("*.md")))
 CARDS = (*sorted(PROJECT.glob("examples/*/README.md")), *sorted(PROJECT.glob("src/standoff/*/README.md")))
+LANGUAGES = {"python", "console", "yaml", "json", "xml", "text"}
+"""What is typed is `console`, so that nothing escapes these tests as `bash` or as no language."""
 FOR_SITE_MANAGERS = ("first-site", "report", "reference-objects", "zones")
 
 _FENCE = re.compile(
@@ -47,6 +49,13 @@ class Snippet:
     text: str
     line: int
     is_live: bool
+
+
+def test_every_fence_of_a_page_says_its_language() -> None:
+    for page in PAGES:
+        fences = re.findall(r"^```.*$", page.read_text(encoding="utf-8"), re.MULTILINE)
+        assert {fence.removeprefix("```") for fence in fences[::2]} <= LANGUAGES, page
+        assert {*fences[1::2]} <= {"```"}, page
 
 
 def snippets(page: Path, *languages: str) -> list[Snippet]:
@@ -79,7 +88,7 @@ def executions() -> list[Any]:
 @pytest.fixture
 def workshop(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Enter a folder with the shipped film as `site.mp4`, what is known of it, a run of it and labelled pictures."""
-    shutil.copy(FILM / "video.mp4", tmp_path / "site.mp4")
+    (tmp_path / "site.mp4").symlink_to(FILM / "video.mp4")
     shutil.copy(FILM / "camera.yaml", tmp_path)
     site = yaml.safe_load((FILM / "reference.yaml").read_text())
     site |= {"detections": str(DETECTIONS), "source": {"stop_s": 0.3, "every": 2}, "outputs": ["tracks", "hazards"]}
@@ -89,7 +98,7 @@ def workshop(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     clip = tmp_path / "clips" / "mobile"
     clip.mkdir(parents=True)
     for name in _CLIP:
-        shutil.copy(FILM / name, clip)
+        (clip / name).symlink_to(FILM / name)
     lines = {f"flight{number}-{frame}": "0 0.5 0.5 0.3 0.4\n" for number in range(3) for frame in range(2)}
     write_yolo(tmp_path / "labelled", lines)
     write_mixture(tmp_path / "mixture.yaml", {"path": "labelled", "groups": {"val": ["flight2"]}})
