@@ -29,7 +29,9 @@ from standoff.core.errors import StandoffError
 
 PROJECT = Path(__file__).resolve().parents[2]
 PAGES = (PROJECT / "README.md", *sorted((PROJECT / "docs").glob("*.md")))
-CARDS = (*sorted(PROJECT.glob("examples/*/README.md")), *sorted(PROJECT.glob("src/standoff/*/README.md")))
+CARDS = sorted(
+    path for place in ("examples/*", "src/standoff/*", "simulator") for path in PROJECT.glob(f"{place}/README.md")
+)
 LANGUAGES = {"python", "console", "yaml", "json", "xml", "text"}
 """What is typed is `console`, so that nothing escapes these tests as `bash` or as no language."""
 FOR_SITE_MANAGERS = ("first-site", "report", "reference-objects", "zones")
