@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 from stages.sinks.fake_site import FakeSite
@@ -45,3 +46,13 @@ def test_what_the_end_of_the_stream_closes_is_written_with_its_classes(tmp_path:
     last = json.loads((tmp_path / "hazards.jsonl").read_text().splitlines()[-1])
     assert (last["phase"], last["reason"], last["distance_m"]) == ("closed", "end of stream", None)
     assert last["classes"] == ["worker", "excavator"]
+
+
+def test_what_the_end_of_the_stream_opens_says_its_classes_too(tmp_path: Path) -> None:
+    sink = HazardSink(tmp_path / "hazards.jsonl")
+    result = replace(FakeSite((64, 36)).result(0), hazards=())
+    sink.write(result)
+    late = Hazard("H1", "proximity", "danger", "opened", (2, 3), 0.0, 1.0, -1.0, 0.1)
+    sink.close(Outcome("complete", hazards=(late, replace(late, phase="closed"))))
+    lines = [json.loads(line) for line in (tmp_path / "hazards.jsonl").read_text().splitlines()]
+    assert [line["classes"] for line in lines] == [["worker", "excavator"]] * 2

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import asdict
 from datetime import timedelta
 from pathlib import Path
@@ -10,7 +10,7 @@ from typing import Any
 
 from standoff.core.classes import CLASSES
 from standoff.core.protocols import LiveSink
-from standoff.core.types import Frame, FrameResult, Hazard, Outcome, Silence
+from standoff.core.types import Frame, FrameResult, Hazard, Outcome, Silence, Tracks
 from standoff.files.json_text import json_line
 
 
@@ -29,25 +29,24 @@ class HazardSink(LiveSink):
         self._file = Path(path).open("w", encoding="utf-8", buffering=1)  # noqa: SIM115 - closed in close()
         self._classes: dict[str, list[str | None]] = {}
         self._frame: Frame | None = None
+        self._tracks = Tracks.empty()
 
     def write(self, result: FrameResult) -> None:
         """Append this frame's events."""
         self._frame = result.frame
-        if result.hazards:
-            ids_and_classes = zip(result.tracks.track_id.tolist(), result.tracks.class_id.tolist(), strict=True)
-            names = {track_id: CLASSES[class_id].name for track_id, class_id in ids_and_classes}
-            for event in result.hazards:
-                self._classes.setdefault(event.hazard_id, [names.get(track_id) for track_id in event.track_ids])
-            self._append(result.hazards)
+        self._tracks = result.tracks
+        self._append(result.hazards)
 
     def tell(self, silence: Silence) -> None:
         """Append what was said while nothing arrived."""
         self._append(silence.hazards)
 
-    def _append(self, events: Iterable[Hazard]) -> None:
+    def _append(self, events: Sequence[Hazard]) -> None:
+        ids_and_classes = zip(self._tracks.track_id.tolist(), self._tracks.class_id.tolist(), strict=True)
+        names = {track_id: CLASSES[class_id].name for track_id, class_id in ids_and_classes} if events else {}
         for event in events:
-            # a hazard may close after its track has gone, so its classes are those of its first event
-            classes = self._classes.get(event.hazard_id, [])
+            # A hazard may close after its track has gone, so its classes are those of its first event.
+            classes = self._classes.setdefault(event.hazard_id, [names.get(track_id) for track_id in event.track_ids])
             fields = {name: value for name, value in asdict(event).items() if name != "zone" or value}
             line = {**_moment(self._frame, event.time_s), **fields, "classes": classes}
             self._file.write(json_line(line))
