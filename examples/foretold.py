@@ -25,7 +25,8 @@ from standoff.core.classes import CLASSES
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.roles import IS_EQUIPMENT
 from standoff.core.types import GroundMap, Hazard, IntArray, Proximities, Tracks
-from standoff.simulation.casting import CASTS, Stage
+from standoff.simulation.cast import Stage
+from standoff.simulation.casting import CASTS
 from standoff.simulation.motion import sample
 from standoff.simulation.people.anthropometry import MEAN_STATURE_M
 from standoff.stages.hazard import HazardMonitor, HazardParams

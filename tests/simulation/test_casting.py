@@ -10,7 +10,8 @@ from tolerances import GEOMETRY_REL
 
 from standoff.core.classes import CLASS_BY_NAME, CLASSES
 from standoff.simulation.behaviour import idle
-from standoff.simulation.casting import CASTS, Cast, Stage, crowd, is_person, swept
+from standoff.simulation.cast import Cast, Stage, is_person, swept
+from standoff.simulation.casting import CASTS, crowd
 from standoff.simulation.motion import Place, sample
 from standoff.simulation.people.worker import make_worker
 from standoff.simulation.scene import Actor

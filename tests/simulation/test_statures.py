@@ -10,7 +10,8 @@ from tolerances import GEOMETRY_REL
 
 from standoff.core.homography import FloatArray
 from standoff.simulation.behaviour import standing_working, stooping, walking_past
-from standoff.simulation.casting import CASTS, Cast, Stage, bend_over, is_person
+from standoff.simulation.cast import Cast, Stage, is_person
+from standoff.simulation.casting import CASTS, bend_over
 from standoff.simulation.flight import Still
 from standoff.simulation.moment import scene_at
 from standoff.simulation.motion import Place, sample

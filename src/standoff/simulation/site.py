@@ -10,7 +10,8 @@ import shapely
 
 from standoff.core.camera import Camera
 from standoff.core.homography import FloatArray
-from standoff.simulation.casting import CASTS, Cast, Stage, bend_over
+from standoff.simulation.cast import Cast, Stage
+from standoff.simulation.casting import CASTS, bend_over
 from standoff.simulation.covers import make_cover
 from standoff.simulation.flight import drone_camera, make_flight
 from standoff.simulation.layout import lay_out
