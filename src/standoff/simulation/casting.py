@@ -22,6 +22,7 @@ from standoff.simulation.machines.roller import make_roller
 from standoff.simulation.machines.vehicle import make_vehicle
 from standoff.simulation.machines.wheel_loader import make_wheel_loader
 from standoff.simulation.motion import Place, sample
+from standoff.simulation.ordinary import ordinary_site
 from standoff.simulation.scene import Model, Motion
 
 _TRIES = 12
@@ -235,6 +236,7 @@ CASTS: Mapping[str, Callable[[np.random.Generator, Stage], Cast]] = MappingProxy
         "stationary-20": partial(_stationary, distance_m=20.0),
         "board": _nobody,
         "random": _any_number,
+        "ordinary": ordinary_site,
         "busy": partial(crowd, workers=_BUSY_WORKERS, machines=_BUSY_MACHINES),
     }
 )
