@@ -42,6 +42,9 @@ MEMORY_S: Final = np.array([_MOTION_OF[site_class.name].memory_s for site_class 
 _STANDING_S, _STARTING_SHARE = 2.0, 0.4
 """A machine that stood for so long gets no further in three seconds than some metre, other than one that drives."""
 
+_PLACES, _PLACE_BY_SPEED, _SPEED_BY_PLACE, _SPEEDS = (slice(start, start + 6, 5) for start in (0, 2, 8, 10))
+"""Entries of a (4, 4) matrix, row by row: x of x and y of y, x of vx and y of vy, and so on."""
+
 
 def transition(class_id: IntArray, step_s: float) -> FloatArray:
     """Return (N, 4, 4) what x, y, vx and vy become on average.
@@ -50,12 +53,13 @@ def transition(class_id: IntArray, step_s: float) -> FloatArray:
         class_id: (N,) ids of `CLASSES`.
         step_s: Not negative.
     """
-    left = np.exp(-step_s / MEMORY_S[class_id])
-    matrix = np.tile(np.eye(4), (len(class_id), 1, 1))
-    for axis in (0, 1):
-        matrix[:, axis, axis + 2] = MEMORY_S[class_id] * (1.0 - left)
-        matrix[:, axis + 2, axis + 2] = left
-    return matrix
+    memory_s = MEMORY_S[class_id]
+    left = np.exp(-step_s / memory_s)
+    matrix = np.zeros((len(class_id), 16))
+    matrix[:, _PLACES] = 1.0
+    matrix[:, _PLACE_BY_SPEED] = (memory_s * (1.0 - left))[:, None]
+    matrix[:, _SPEEDS] = left[:, None]
+    return matrix.reshape(-1, 4, 4)
 
 
 def wandering(class_id: IntArray, step_s: float, standing_s: FloatArray | None = None) -> FloatArray:
@@ -71,11 +75,10 @@ def wandering(class_id: IntArray, step_s: float, standing_s: FloatArray | None =
         variance = np.where((standing_s >= _STANDING_S) & IS_EQUIPMENT[class_id], _STARTING_SHARE**2, 1.0) * variance
     steps = step_s / memory_s
     left = np.exp(-steps)
-    matrix = np.zeros((len(class_id), 4, 4))
+    matrix = np.zeros((len(class_id), 16))
     place = variance * memory_s**2 * np.maximum(2.0 * steps - 3.0 + 4.0 * left - left**2, 0.0)
     both = variance * memory_s * (1.0 - left) ** 2
-    for axis in (0, 1):
-        matrix[:, axis, axis] = place
-        matrix[:, axis, axis + 2] = matrix[:, axis + 2, axis] = both
-        matrix[:, axis + 2, axis + 2] = variance * (1.0 - left**2)
-    return matrix
+    matrix[:, _PLACES] = place[:, None]
+    matrix[:, _PLACE_BY_SPEED] = matrix[:, _SPEED_BY_PLACE] = both[:, None]
+    matrix[:, _SPEEDS] = (variance * (1.0 - left**2))[:, None]
+    return matrix.reshape(-1, 4, 4)

@@ -16,8 +16,9 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from standoff.core.compiled import compiled
 from standoff.core.ground_motion import transition, wandering
-from standoff.core.homography import BoolArray, FloatArray
+from standoff.core.homography import FloatArray
 from standoff.core.types import GroundPositions, IntArray
 
 _ComplexArray = npt.NDArray[np.complex128]
@@ -72,53 +73,104 @@ def predict(positions: GroundPositions, a: IntArray, b: IntArray, reach_m: Float
         horizon_s: How far ahead, in steps of `STEP_S`; `_MOST_STEPS` of them at most.
     """
     steps = min(round(horizon_s / STEP_S), _MOST_STEPS)
-    sides = [_Side.of(positions, rows) for rows in (a, b)]
-    offset_m = sides[1].place - sides[0].place
-    measured = np.isfinite(offset_m)
-    closest_m, closest_in_s = np.abs(offset_m), np.where(measured, 0.0, np.nan)
-    ahead = [side.mean_places(steps) for side in sides]
-    for k, distance_m in enumerate(np.abs(ahead[1] - ahead[0])):
-        nearer = distance_m < closest_m
-        closest_m, closest_in_s = (
-            np.where(nearer, distance_m, closest_m),
-            np.where(nearer, (k + 1) * STEP_S, closest_in_s),
-        )
+    movers = _Movers.of(positions)
+    likeliest = np.concatenate([movers.place[None], movers.mean_places(steps)])
+    apart_m = np.abs(likeliest[:, b] - likeliest[:, a])
+    measured = np.isfinite(apart_m[0])
+    nearest = apart_m.argmin(axis=0)
+    closest_m = np.take_along_axis(apart_m, nearest[None], axis=0)[0]
+    closest_in_s = np.where(measured, nearest * STEP_S, np.nan)
     now, soon = np.where(measured, 0.0, np.nan), np.where(measured, 0.0, np.nan)
     shared_m = positions.map_factor_m[b] - positions.map_factor_m[a]
-    spread_m = np.sqrt(sides[0].spread_m2(steps) + sides[1].spread_m2(steps) + (shared_m**2).sum(axis=(1, 2)))
+    spread_m2 = movers.spread_m2(steps)
+    spread_m = np.sqrt(spread_m2[a] + spread_m2[b] + (shared_m**2).sum(axis=(1, 2)))
     possible = np.flatnonzero(measured & (closest_m - _IMPOSSIBLE * spread_m < reach_m))
     if len(possible):
         shared = shared_m[possible] @ _MAPS
-        shift = shared[:, 0] + 1j * shared[:, 1]
-        touched = _touched([side.some(possible) for side in sides], shift, reach_m[possible, None], steps)
-        now[possible], soon[possible] = (part.mean(axis=1) for part in touched)
+        # Whoever is in several pairs goes the same paths in all of them.
+        (rows_a, of_a), (rows_b, of_b) = (np.unique(one[possible], return_inverse=True) for one in (a, b))
+        now[possible], soon[possible] = _touching(
+            movers.paths(rows_a, _STATES[0], _STEPS[0][:steps]),
+            movers.paths(rows_b, _STATES[1], _STEPS[1][:steps]),
+            of_a,
+            of_b,
+            shared[:, 0] + 1j * shared[:, 1],
+            reach_m[possible],
+        )
     return Prediction(closest_m, closest_in_s, now, soon)
 
 
-def _touched(sides: list[_Side], shift: _ComplexArray, reach_m: FloatArray, steps: int) -> tuple[BoolArray, BoolArray]:
-    """Return (K, paths) which paths touch at their beginning, and which anywhere."""
-    paths = [side.begin(drawn) for side, drawn in zip(sides, _STATES, strict=True)]
-    offset = paths[1][0] - paths[0][0] + shift
-    now: BoolArray = np.abs(offset) < reach_m
-    soon = now.copy()
-    for k in range(steps):
-        paths = [side.go_on(*path, drawn[k]) for side, path, drawn in zip(sides, paths, _STEPS, strict=True)]
-        soon |= np.abs(paths[1][0] - paths[0][0] + shift) < reach_m
+@compiled
+def _touching(
+    paths_a: _ComplexArray,
+    paths_b: _ComplexArray,
+    of_a: IntArray,
+    of_b: IntArray,
+    shift: _ComplexArray,
+    reach_m: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Return (K,) which share of paths touches at its beginning, and which anywhere.
+
+    Args:
+        paths_a: (A, times, paths) places of the one side.
+        paths_b: (B, times, paths) of the other.
+        of_a: (K,) which of the first each pair goes.
+        of_b: (K,) and of the second.
+        shift: (K, paths) by what the map moves them apart.
+        reach_m: (K,) at which distance they touch.
+    """
+    pairs, (times, paths) = len(of_a), paths_a.shape[1:]
+    now, soon = np.zeros(pairs), np.zeros(pairs)
+    for pair in range(pairs):
+        one, other, reach2 = paths_a[of_a[pair]], paths_b[of_b[pair]], reach_m[pair] ** 2
+        touched = np.zeros(paths, dtype=np.bool_)
+        for time in range(times):
+            for path in range(paths):
+                off = other[time, path] - one[time, path] + shift[pair, path]
+                touched[path] |= off.real * off.real + off.imag * off.imag < reach2
+            if time == 0:
+                now[pair] = touched.sum() / paths
+        soon[pair] = touched.sum() / paths
     return now, soon
 
 
-class _Side(NamedTuple):
-    """One entity of each pair, (K,); places and velocities are complex numbers, x + iy.
+@compiled
+def _gone_on(
+    place: _ComplexArray,
+    velocity: _ComplexArray,
+    travelled: FloatArray,
+    left: FloatArray,
+    noise: FloatArray,
+    drawn: _ComplexArray,
+) -> _ComplexArray:
+    """Return (N, 1 + steps, paths) places from (N, paths) places and velocities on; the rest as in `_Movers`."""
+    count, paths = place.shape
+    steps = len(drawn)
+    gone = np.empty((count, 1 + steps, paths), dtype=np.complex128)
+    for row in range(count):
+        by_first, both, rest = noise[row]
+        for path in range(paths):
+            at, speed = place[row, path], velocity[row, path]
+            gone[row, 0, path] = at
+            for step in range(steps):
+                at = at + travelled[row] * speed + by_first * drawn[step, 0, path]
+                speed = left[row] * speed + both * drawn[step, 0, path] + rest * drawn[step, 1, path]
+                gone[row, 1 + step, path] = at
+    return gone
+
+
+class _Movers(NamedTuple):
+    """All tracks, (M,); places and velocities are complex numbers, x + iy.
 
     Attributes:
         place: In metres.
         velocity: In metres per second; 0 where it is unknown.
-        covariance: (K, 4, 4) of both.
+        covariance: (M, 4, 4) of both.
         class_id: For its motion.
         standing_s: For how long it has not moved.
         left: Of a velocity after a step.
         travelled: Seconds for which a velocity carries in a step.
-        noise: (K, 3) what a step adds: place from the first number that is drawn, velocity from the first and second.
+        noise: (M, 3) what a step adds: place from the first number that is drawn, velocity from the first and second.
     """
 
     place: _ComplexArray
@@ -131,18 +183,17 @@ class _Side(NamedTuple):
     noise: FloatArray
 
     @classmethod
-    def of(cls, positions: GroundPositions, rows: IntArray) -> _Side:
-        class_id = positions.class_id[rows]
-        standing_s = positions.standing_s[rows]
+    def of(cls, positions: GroundPositions) -> _Movers:
+        class_id, standing_s = positions.class_id, positions.standing_s
         forth, gained = transition(class_id, STEP_S), wandering(class_id, STEP_S, standing_s)
         by_first = np.sqrt(gained[:, 0, 0])
         both = gained[:, 0, 2] / by_first
         rest = np.sqrt(np.maximum(gained[:, 2, 2] - both**2, 0.0))
-        place, velocity = positions.xy_m[rows], np.nan_to_num(positions.velocity_mps[rows])
+        place, velocity = positions.xy_m, np.nan_to_num(positions.velocity_mps)
         return cls(
             place[:, 0] + 1j * place[:, 1],
             velocity[:, 0] + 1j * velocity[:, 1],
-            positions.state_covariance[rows],
+            positions.state_covariance,
             class_id,
             standing_s,
             forth[:, 2, 2],
@@ -150,38 +201,30 @@ class _Side(NamedTuple):
             np.column_stack([by_first, both, rest]),
         )
 
-    def some(self, which: IntArray) -> _Side:
-        """Return some of the pairs."""
-        return _Side(
-            self.place[which], self.velocity[which], self.covariance[which], self.class_id[which],
-            self.standing_s[which], self.left[which],
-            self.travelled[which], self.noise[which],
-        )  # fmt: skip
-
     def mean_places(self, steps: int) -> _ComplexArray:
-        """Return (steps, K) where the likeliest path is after each step."""
+        """Return (steps, M) where the likeliest path is after each step."""
         left = self.left ** np.arange(steps)[:, None]
         places: _ComplexArray = self.place + np.cumsum(left * self.travelled, axis=0) * self.velocity
         return places
 
     def spread_m2(self, steps: int) -> FloatArray:
-        """Return (K,) variance of the place after all steps, summed over both coordinates."""
+        """Return (M,) variance of the place after all steps, summed over both coordinates."""
         forth = transition(self.class_id, steps * STEP_S)
         gained = wandering(self.class_id, steps * STEP_S, self.standing_s)
         covariance = forth @ self.covariance @ forth.transpose(0, 2, 1) + gained
         spread: FloatArray = covariance[:, 0, 0] + covariance[:, 1, 1]
         return spread
 
-    def begin(self, drawn: FloatArray) -> tuple[_ComplexArray, _ComplexArray]:
-        """Return (K, paths) places and velocities as they may be now."""
-        variances, axes = np.linalg.eigh(self.covariance)
-        off = axes * np.sqrt(np.maximum(variances, 0.0))[:, None, :] @ drawn
-        return self.place[:, None] + off[:, 0] + 1j * off[:, 1], self.velocity[:, None] + off[:, 2] + 1j * off[:, 3]
+    def paths(self, rows: IntArray, states: FloatArray, drawn: _ComplexArray) -> _ComplexArray:
+        """Return (N, 1 + steps, paths) where some of the tracks (N,) may be now and after each step.
 
-    def go_on(
-        self, places: _ComplexArray, velocities: _ComplexArray, drawn: _ComplexArray
-    ) -> tuple[_ComplexArray, _ComplexArray]:
-        """Return (K, paths) both after a step."""
-        by_first, both, rest = self.noise.T[:, :, None]
-        places = places + self.travelled[:, None] * velocities + by_first * drawn[0]
-        return places, self.left[:, None] * velocities + both * drawn[0] + rest * drawn[1]
+        Args:
+            rows: Which; their places are known.
+            states: (4, paths) numbers drawn for where each is and how fast.
+            drawn: (steps, 2, paths) for what happens on the way.
+        """
+        variances, axes = np.linalg.eigh(self.covariance[rows])
+        off = axes * np.sqrt(np.maximum(variances, 0.0))[:, None, :] @ states
+        place = self.place[rows, None] + off[:, 0] + 1j * off[:, 1]
+        velocity = self.velocity[rows, None] + off[:, 2] + 1j * off[:, 3]
+        return _gone_on(place, velocity, self.travelled[rows], self.left[rows], self.noise[rows], drawn)
