@@ -13,14 +13,15 @@ from typing import Final
 
 import numpy as np
 
+from standoff.core.durations import have_lasted
 from standoff.core.ground_motion import SPEED_MPS, transition, wandering
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import IntArray
 
 _GATE: Final = 18.4
 """Squared distance, in standard errors, that one in 10,000 right places exceeds: chi-square, two degrees of freedom."""
-_DOUBT_S: Final = 0.3 - 1e-6
-"""A place that goes on to be so far off is a new one, not an error; times are rounded."""
+_DOUBT_S: Final = 0.3
+"""A place that goes on to be so far off is a new one, not an error."""
 _KNOWN_SHARE: Final = 0.7
 """A velocity is told once its standard error is less than so much of what its class would have anyway."""
 _STEP_M, _MOVED_SIGMAS = 0.5, 3.0
@@ -105,7 +106,7 @@ class GroundFilter:
         since_s = self._rows["doubted_s"][doubted]
         self._rows["doubted_s"][doubted] = np.where(np.isnan(since_s), time_s, since_s)
         again = np.zeros(len(seen), dtype=np.bool_)
-        again[doubted] = time_s - self._rows["doubted_s"][doubted] >= _DOUBT_S
+        again[doubted] = have_lasted(time_s - self._rows["doubted_s"][doubted], _DOUBT_S)
         self._start(again, xy_m, noise_m2)
         self._stand()
         taken = self._rows["seen_s"] == time_s

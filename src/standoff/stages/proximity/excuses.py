@@ -15,6 +15,7 @@ from typing import Final
 import numpy as np
 
 from standoff.core.classes import CLASS_BY_NAME
+from standoff.core.durations import have_lasted
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.roles import IS_EQUIPMENT
 from standoff.core.types import GroundPositions, IntArray, TextArray
@@ -81,7 +82,7 @@ class Excuses:
     def _parked(self, positions: GroundPositions, machine: IntArray) -> BoolArray:
         after_s = np.inf if self._params.parked_after_s is None else self._params.parked_after_s
         swings = positions.class_id[machine] == _EXCAVATOR
-        parked: BoolArray = (positions.standing_s[machine] >= after_s) & ~swings
+        parked: BoolArray = have_lasted(positions.standing_s[machine], after_s) & ~swings
         return parked
 
     def _riding(
