@@ -20,6 +20,9 @@ open at any time of it.
 pair from a second before it to the horizon after it, a *near miss* if there is none but the gap was less than a metre
 in that time, which is the paper's buffer for the error of measuring; else it is a *false* warning, out of nothing.
 
+Several sites are watched at once, a kilometre apart on one ground, and pairs that are so far apart that no probability
+is left are not measured: that saves most of the time and changes nothing else.
+
 The first minute of each shift of the ordinary cast, in which nobody can know what is parked, is not judged, nor the
 first five seconds of the others.
 """
@@ -50,7 +53,11 @@ from standoff.stages.proximity import ProximityMeter, ProximityParams
 STEP_S = 0.2
 LASTING_S = {"ordinary": 900.0, "busy": 120.0, "mobile": 120.0}
 NOT_JUDGED_S = {"ordinary": 60.0, "busy": 5.0, "mobile": 5.0}
-PX_PER_M, SIZE_PX, MIDDLE_M = 100.0, (40_000, 40_000), 200.0
+PX_PER_M, MIDDLE_M = 100.0, 200.0
+SITES_AT_ONCE, SITES_APART_M, TRACKS_A_SITE = 8, 1000.0, 100
+FAR_M = {"excavator": 6.0}
+OTHERS_FAR_M = 16.0
+"""Beyond its circle: nobody comes into it within the horizon, however fast both are."""
 LIMITS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
 CHANGING_M = {"worker": 0.08, "excavator": 0.2}
 LASTING_M = {"worker": 0.1, "excavator": 0.35}
@@ -65,6 +72,8 @@ CALM_S = 2.0
 Pair = tuple[int, int]
 Span = tuple[float, float]
 Kind = Literal["right", "near miss", "false"]
+Measured = tuple[GroundPositions, Proximities]
+_KEY = 1_000_000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -144,67 +153,90 @@ def work(cast: str, seed: int) -> Shift:
     return Shift(class_id, np.array(columns).transpose(2, 0, 1), NOT_JUDGED_S[cast])
 
 
-def seen(shift: Shift, rng: np.random.Generator, error: float) -> Iterator[Tracks]:
-    """Give what a camera would tell of each frame."""
-    names = [CLASSES[i].name for i in shift.class_id]
-    changing_m = error * np.array([CHANGING_M.get(name, OTHER_MACHINE_M[0]) for name in names])
-    lasting_m = error * np.array([LASTING_M.get(name, OTHER_MACHINE_M[1]) for name in names])
-    count = len(names)
+def seen(shift: Shift, rng: np.random.Generator, error: float) -> Iterator[tuple[FloatArray, BoolArray]]:
+    """Give where a camera would take everybody to be in each frame, (E, 2), and whom it would find, (E,)."""
+    changing_m, lasting_m = errors_m(shift, error)
+    count = len(changing_m)
     kept = np.exp(-STEP_S / LASTS_S)
     bias_m = lasting_m[:, None] * rng.normal(size=(count, 2))
     hidden_s = np.zeros(count)
-    variance_px2 = PX_PER_M**2 * (changing_m**2 + lasting_m**2)
     for xy_m in shift.xy_m:
         bias_m = kept * bias_m + np.sqrt(1.0 - kept**2) * lasting_m[:, None] * rng.normal(size=(count, 2))
         hides = (hidden_s <= 0.0) & (rng.random(count) < HIDDEN_PER_S * STEP_S)
         hidden_s = np.where(hides, rng.uniform(*HIDDEN_S, count), hidden_s - STEP_S)
         places_m = xy_m + bias_m + changing_m[:, None] * rng.normal(size=(count, 2))
-        yield _tracks(shift, places_m, (hidden_s <= 0.0) & (rng.random(count) >= MISSED), variance_px2)
+        yield places_m, (hidden_s <= 0.0) & (rng.random(count) >= MISSED)
+
+
+def errors_m(shift: Shift, error: float) -> tuple[FloatArray, FloatArray]:
+    """Return (E,) standard errors of everybody's ground point: that of each frame, and what lasts."""
+    names = [CLASSES[i].name for i in shift.class_id]
+    changing_m = np.array([CHANGING_M.get(name, OTHER_MACHINE_M[0]) for name in names])
+    lasting_m = np.array([LASTING_M.get(name, OTHER_MACHINE_M[1]) for name in names])
+    return error * changing_m, error * lasting_m
 
 
 def _map() -> GroundMap:
-    """Return the exact map of a picture that shows the site from straight above."""
+    """Return the exact map of a picture that shows all sites from straight above."""
     matrix = np.diag([1 / PX_PER_M, 1 / PX_PER_M, 1.0])
     matrix[:2, 2] = -MIDDLE_M
-    return GroundMap(matrix, np.zeros((9, 9)), SIZE_PX, "exact", 1 / PX_PER_M)
+    size_px = (round(PX_PER_M * SITES_APART_M * SITES_AT_ONCE), round(2.0 * PX_PER_M * MIDDLE_M))
+    return GroundMap(matrix, np.zeros((9, 9)), size_px, "exact", 1 / PX_PER_M)
 
 
-def _tracks(shift: Shift, places_m: FloatArray, observed: BoolArray, variance_px2: FloatArray) -> Tracks:
-    """Return everybody as the tracker would tell them in that picture."""
-    count, foot_px = len(places_m), PX_PER_M * (places_m + MIDDLE_M)
-    return Tracks(
-        track_id=np.arange(1, count + 1),
-        xyxy_px=np.concatenate([foot_px - 60.0, foot_px + 60.0], axis=1),
-        score=np.full(count, 0.9),
-        class_id=shift.class_id,
-        observed=observed,
-        age_s=np.full(count, 1.0),
-        foot_px=foot_px,
-        foot_covariance_px2=variance_px2[:, None, None] * np.eye(2),
-    )
-
-
-def measured(shift: Shift, rng: np.random.Generator, error: float) -> list[tuple[GroundPositions, Proximities]]:
-    """Return what the stages locate and proximity say of each frame."""
+def measured(shifts: Sequence[Shift], rngs: Sequence[np.random.Generator], error: float) -> list[Measured]:
+    """Return what the stages locate and proximity say of each frame, of the sites side by side."""
     ground, locator, meter = _map(), Locator(), ProximityMeter()
+    class_id = np.concatenate([shift.class_id for shift in shifts])
+    track_id = np.concatenate([TRACKS_A_SITE * k + np.arange(1, len(s.class_id) + 1) for k, s in enumerate(shifts)])
+    middle_m = np.concatenate([np.tile([k * SITES_APART_M, 0.0], (len(s.class_id), 1)) for k, s in enumerate(shifts)])
+    variance_px2 = PX_PER_M**2 * np.concatenate([np.square(errors_m(s, error)).sum(axis=0) for s in shifts])
+    near = np.concatenate([_near_somebody(shift) for shift in shifts], axis=1)
     frames = []
-    for k, tracks in enumerate(seen(shift, rng, error)):
-        positions = locator.update(k * STEP_S, tracks, ground)
-        frames.append((positions, meter.update(k * STEP_S, positions, ground)))
+    everybody = zip(*(seen(shift, rng, error) for shift, rng in zip(shifts, rngs, strict=True)), strict=True)
+    for k, seen_now in enumerate(everybody):
+        foot_px = PX_PER_M * (np.concatenate([places_m for places_m, _ in seen_now]) + middle_m + MIDDLE_M)
+        tracks = Tracks(
+            track_id=track_id,
+            xyxy_px=np.concatenate([foot_px - 60.0, foot_px + 60.0], axis=1),
+            score=np.full(len(track_id), 0.9),
+            class_id=class_id,
+            observed=np.concatenate([found for _, found in seen_now]),
+            age_s=np.full(len(track_id), 1.0),
+            foot_px=foot_px,
+            foot_covariance_px2=variance_px2[:, None, None] * np.eye(2),
+        )
+        positions = locator.update(k * STEP_S, tracks, ground)[near[k]]
+        pairs = meter.update(k * STEP_S, positions, ground)
+        frames.append((positions, pairs[pairs.track_a // TRACKS_A_SITE == pairs.track_b // TRACKS_A_SITE]))
     return frames
 
 
-def alarms(frames: Sequence[tuple[GroundPositions, Proximities]], params: HazardParams) -> dict[Pair, list[Span]]:
-    """Return when hazards of each pair were open, by the hazard stage.
+def _near_somebody(shift: Shift) -> BoolArray:
+    """Tell (T, E) who has anybody of the other kind so near that they could meet within the horizon."""
+    machines = IS_EQUIPMENT[shift.class_id]
+    near = np.zeros(shift.xy_m.shape[:2], dtype=bool)
+    for a in np.flatnonzero(~machines).tolist():
+        for b in np.flatnonzero(machines).tolist():
+            far_m = FAR_M.get(CLASSES[shift.class_id[b]].name, OTHERS_FAR_M)
+            meet = shift.gap_m((a + 1, b + 1)) < far_m
+            near[meet, a] = near[meet, b] = True
+    return near
+
+
+def alarms(frames: Sequence[Measured], params: HazardParams) -> dict[Pair, list[Span]]:
+    """Return when hazards of each pair of tracks were open, by the hazard stage.
 
     Pairs that are never half as likely as needed are left out, and so are frames in which nothing stirs: neither can
     begin, change or end a hazard.
     """
-    ahead = np.array([pairs.breach_ahead for _, pairs in frames])
     least = 0.5 * params.warning_probability
-    unknown = np.isnan(ahead)
-    may_warn: BoolArray = np.asarray((np.where(unknown, 0.0, ahead) >= least).any(axis=0))
-    stirs = ((ahead >= least) | unknown)[:, may_warn].any(axis=1)
+    keys = [pairs.track_a * _KEY + pairs.track_b for _, pairs in frames]
+    likely = [np.nan_to_num(pairs.breach_ahead) >= least for _, pairs in frames]
+    may_warn = np.unique(np.concatenate([key[of] for key, of in zip(keys, likely, strict=True)]))
+    kept = [np.isin(key, may_warn) for key in keys]
+    stirs = [(of | np.isnan(pairs.breach_ahead))[which].any()
+             for of, which, (_, pairs) in zip(likely, kept, frames, strict=True)]  # fmt: skip
     near = round(CALM_S / STEP_S)
     looks = np.convolve(stirs, np.ones(2 * near + 1), mode="same") > 0.0
     ground, monitor = _map(), HazardMonitor(params)
@@ -213,11 +245,17 @@ def alarms(frames: Sequence[tuple[GroundPositions, Proximities]], params: Hazard
     spans: dict[Pair, list[Span]] = {}
     for k in np.flatnonzero(looks).tolist():
         positions, pairs = frames[k]
-        for event in monitor.update(k * STEP_S, positions, pairs[may_warn], ground, followed):
+        for event in monitor.update(k * STEP_S, positions, pairs[kept[k]], ground, followed):
             _follow(event, open_at, spans)
     for event in monitor.close(len(frames) * STEP_S):
         _follow(event, open_at, spans)
     return spans
+
+
+def of_site(spans: dict[Pair, list[Span]], site: int) -> dict[Pair, list[Span]]:
+    """Return what was said of one site, with its own numbers of tracks."""
+    first = TRACKS_A_SITE * site
+    return {(a - first, b - first): told for (a, b), told in spans.items() if a // TRACKS_A_SITE == site}
 
 
 def _follow(event: Hazard, open_at: dict[str, tuple[Pair, float]], spans: dict[Pair, list[Span]]) -> None:
@@ -308,15 +346,19 @@ def main() -> None:
     hours, worker_hours, began_s = 0.0, 0.0, monotonic()
     with SpokenProgress("shifts", quiet=options.quiet) as progress:
         task = progress.add_task(options.cast, total=shifts, rate=0.0)
-        for k in range(shifts):
-            shift = work(options.cast, 10_000 * options.seed + k)
-            frames = measured(shift, np.random.default_rng([options.seed, k]), options.error)
-            breaches = true_breaches(shift)
-            hours += shift.hours
-            worker_hours += shift.hours * int(np.count_nonzero(~IS_EQUIPMENT[shift.class_id]))
+        for first in range(0, shifts, SITES_AT_ONCE):
+            numbers = range(first, min(first + SITES_AT_ONCE, shifts))
+            sites = [work(options.cast, 10_000 * options.seed + k) for k in numbers]
+            rngs = [np.random.default_rng([options.seed, k]) for k in numbers]
+            frames = measured(sites, rngs, options.error)
+            breaches = [true_breaches(shift) for shift in sites]
+            hours += sum(shift.hours for shift in sites)
+            worker_hours += sum(s.hours * int(np.count_nonzero(~IS_EQUIPMENT[s.class_id])) for s in sites)
             for limit in LIMITS:
-                judge(shift, alarms(frames, HazardParams(warning_probability=limit)), breaches, scores[limit])
-            progress.update(task, advance=1, rate=(k + 1) / (monotonic() - began_s))
+                spans = alarms(frames, HazardParams(warning_probability=limit))
+                for k, shift in enumerate(sites):
+                    judge(shift, of_site(spans, k), breaches[k], scores[limit])
+            progress.update(task, completed=numbers[-1] + 1, rate=(numbers[-1] + 1) / (monotonic() - began_s))
     rows = {limit: scores[limit].row(hours, worker_hours) for limit in LIMITS}
     count, sudden = len(scores[LIMITS[0]].lead_s), len(scores[LIMITS[0]].sudden_lead_s)
     print(f"{hours:.1f} hours, {worker_hours:.1f} of workers, {count} breaches and {sudden} sudden ones")

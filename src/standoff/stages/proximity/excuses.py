@@ -73,9 +73,8 @@ class Excuses:
         mixed = IS_EQUIPMENT[positions.class_id[a]] != IS_EQUIPMENT[positions.class_id[b]]
         excuse[mixed & self._parked(positions, machine)] = PARKED
         excuse[mixed & self._riding(positions, a, b, machine, distance_m)] = IN_CAB
-        for row, pair in enumerate(_ids(positions, a, b)):
-            if pair in self._together:
-                excuse[row] = TOGETHER
+        if self._together:
+            excuse[[pair in self._together for pair in _ids(positions, a, b)]] = TOGETHER
         excuse[np.isnan(distance_m)] = ""
         return excuse
 
@@ -93,14 +92,14 @@ class Excuses:
         riding = np.zeros(len(a), dtype=np.bool_)
         if not self._params.cabs:
             return riding
-        for row, pair in enumerate(_ids(positions, a, b)):
+        # Among hundreds of pairs hardly any is so near.
+        (rows,) = np.nonzero(~(distance_m > _CAB_WITHIN_M))
+        for row, pair in zip(rows.tolist(), _ids(positions, a[rows], b[rows]), strict=True):
             ride = self._rides.get(pair)
             if np.isnan(distance_m[row]):
                 # Hidden for a moment: nobody has left.
                 if ride is not None:
                     rides[pair] = ride
-                continue
-            if distance_m[row] > _CAB_WITHIN_M:
                 continue
             at_m = positions.xy_m[machine[row]]
             ride = ride or _Ride(at_m)
