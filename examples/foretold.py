@@ -35,7 +35,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import monotonic
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -131,16 +131,20 @@ class Score:
         """Return the figures of one line of the table."""
         lead, sudden = np.array(self.lead_s), np.array(self.sudden_lead_s)
         return {
-            "recall_2_s": float(np.mean(lead >= 2.0)),
-            "recall_1_s": float(np.mean(lead >= 1.0)),
-            "recall_0_s": float(np.mean(lead >= 0.0)),
+            "recall_2_s": _share(lead >= 2.0),
+            "recall_1_s": _share(lead >= 1.0),
+            "recall_0_s": _share(lead >= 0.0),
             "lost": int(np.isnan(lead).sum() + np.isnan(sudden).sum()),
             "sudden_told_in_1_s": int(np.sum(sudden >= -1.0)),
-            "median_lead_s": float(np.nanmedian(lead)),
+            "median_lead_s": float(np.median(lead[~np.isnan(lead)])) if np.isfinite(lead).any() else np.nan,
             "false_per_hour": self.alarms["false"] / hours,
             "near_misses_per_hour": self.alarms["near miss"] / hours,
             "alarms_per_worker_hour": sum(self.alarms.values()) / worker_hours,
         }
+
+
+def _share(those: BoolArray) -> float:
+    return float(np.mean(those)) if len(those) else np.nan
 
 
 def work(cast: str, seed: int) -> Shift:
@@ -358,16 +362,36 @@ def main() -> None:
                 spans = alarms(frames, HazardParams(warning_probability=limit))
                 for k, shift in enumerate(sites):
                     judge(shift, of_site(spans, k), breaches[k], scores[limit])
+            told = summary(scores, hours, worker_hours)
+            if options.json:
+                # After each few sites, so that a run that is stopped has told something.
+                options.json.write_text(json.dumps(told, indent=1))
             progress.update(task, completed=numbers[-1] + 1, rate=(numbers[-1] + 1) / (monotonic() - began_s))
-    rows = {limit: scores[limit].row(hours, worker_hours) for limit in LIMITS}
-    count, sudden = len(scores[LIMITS[0]].lead_s), len(scores[LIMITS[0]].sudden_lead_s)
-    print(f"{hours:.1f} hours, {worker_hours:.1f} of workers, {count} breaches and {sudden} sudden ones")
-    print("| warn at | " + " | ".join(name.replace("_", " ") for name in rows[LIMITS[0]]) + " |")
-    for limit, row in rows.items():
-        print(f"| {limit:.2f} | " + " | ".join(f"{value:.3g}" for value in row.values()) + " |")
-    if options.json:
-        told = {"hours": hours, "worker_hours": worker_hours, "breaches": count, "sudden": sudden, "rows": rows}
-        options.json.write_text(json.dumps(told, indent=1))
+    for line in table(told):
+        print(line)
+
+
+def summary(scores: dict[float, Score], hours: float, worker_hours: float) -> dict[str, Any]:
+    """Return all figures so far."""
+    first = scores[LIMITS[0]]
+    return {
+        "hours": hours,
+        "worker_hours": worker_hours,
+        "breaches": len(first.lead_s),
+        "sudden": len(first.sudden_lead_s),
+        "by_limit": {f"{limit:.2f}": score.row(hours, worker_hours) for limit, score in scores.items()},
+    }
+
+
+def table(told: dict[str, Any]) -> list[str]:
+    """Return the lines of the table."""
+    rows = told["by_limit"]
+    names = next(iter(rows.values()))
+    lines = [f"{told['hours']:.1f} hours, {told['worker_hours']:.1f} of workers, {told['breaches']} breaches and "
+             f"{told['sudden']} sudden ones", "| warn at | " + " | ".join(n.replace("_", " ") for n in names) + " |"]  # fmt: skip
+    return lines + [
+        f"| {at} | " + " | ".join(f"{value:.3g}" for value in row.values()) + " |" for at, row in rows.items()
+    ]
 
 
 if __name__ == "__main__":
