@@ -387,11 +387,12 @@ def table(told: dict[str, Any]) -> list[str]:
     """Return the lines of the table."""
     rows = told["by_limit"]
     names = next(iter(rows.values()))
-    lines = [f"{told['hours']:.1f} hours, {told['worker_hours']:.1f} of workers, {told['breaches']} breaches and "
-             f"{told['sudden']} sudden ones", "| warn at | " + " | ".join(n.replace("_", " ") for n in names) + " |"]  # fmt: skip
-    return lines + [
-        f"| {at} | " + " | ".join(f"{value:.3g}" for value in row.values()) + " |" for at, row in rows.items()
-    ]
+    count = f"{told['breaches']} breaches and {told['sudden']} sudden ones"
+    lines = [f"{told['hours']:.1f} hours, {told['worker_hours']:.1f} of workers, {count}"]
+    lines.append("| warn at | " + " | ".join(name.replace("_", " ") for name in names) + " |")
+    for limit, row in rows.items():
+        lines.append(f"| {limit} | " + " | ".join(f"{value:.3g}" for value in row.values()) + " |")
+    return lines
 
 
 if __name__ == "__main__":

@@ -27,9 +27,10 @@ PUBLIC_NAMES = {
     "standoff.stages.hazard": {"HazardMonitor", "HazardParams"},
     "standoff.simulation.render": {"Cutout", "Look", "Rendered", "Renderer"},
     "standoff.simulation.behaviour": {
-        "carrying_between", "crossing_behind", "digging", "dozing", "driving_through", "grading", "idle",
-        "keep_distance", "loader_loading", "near_miss", "pair_talking", "random_stance", "rolling", "spreading",
-        "standing_working", "stooping", "truck_loading", "walking_past",
+        "carrying_between", "crossing_behind", "digging", "dozing", "driving_off", "driving_through", "errand",
+        "grading", "hauling", "heaping", "idle", "keep_distance", "loader_loading", "near_miss", "pair_talking",
+        "random_stance", "riding", "rolling", "spreading", "standing_working", "staying", "stooping", "truck_loading",
+        "walking_past",
     },
 }  # fmt: skip
 

@@ -32,6 +32,17 @@ SCRIPTS: dict[str, tuple[tuple[MovingModel, ...], Script]] = {
         (LOADER, TRUCK),
         lambda rng: behaviour.loader_loading(rng, LOADER, TRUCK, ORIGIN, ORIGIN.moved(-6.0, 10.0), 2 * DURATION_S),
     ),
+    "hauling": (
+        (EXCAVATOR, TRUCK),
+        lambda rng: behaviour.hauling(rng, EXCAVATOR, TRUCK, ORIGIN, ORIGIN.moved(1.0, 7.8, 0.1), 8 * DURATION_S),
+    ),
+    "heaping": (
+        (LOADER,), lambda rng: behaviour.heaping(rng, LOADER, ORIGIN, ORIGIN.moved(-9.0, 9.0, -1.6), 2 * DURATION_S)
+    ),
+    "errand": (
+        (WORKER,),
+        lambda rng: behaviour.errand(rng, WORKER, ORIGIN, np.array([[0.0, 0.0], [6.0, 2.0], [9.0, 9.0]]), DURATION_S),
+    ),
     "spreading": ((LOADER,), lambda rng: behaviour.spreading(rng, LOADER, ORIGIN, 14.0, DURATION_S)),
     "tipping": ((TRUCK,), lambda rng: behaviour.spreading(rng, TRUCK, ORIGIN, 14.0, DURATION_S)),
     "dozing": ((DOZER,), lambda rng: behaviour.dozing(rng, DOZER, ORIGIN, 18.0, DURATION_S)),
