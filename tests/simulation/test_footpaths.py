@@ -27,7 +27,7 @@ def test_a_way_keeps_off_what_is_avoided_and_is_no_shorter_than_straight(seed: i
         if way_m is None:
             continue
         found += 1
-        np.testing.assert_array_equal(way_m[[0, -1]], [start_m, end_m])
+        np.testing.assert_allclose(way_m[[0, -1]], [start_m, end_m], atol=1e-12)
         line = shapely.LineString(way_m)
         # Rounded corners may cut a little of a corner that lies outside by as much.
         assert line.intersection(avoided).length < 0.2
@@ -50,7 +50,7 @@ def test_who_stands_on_avoided_ground_leaves_it_the_nearest_way() -> None:
 
 def test_rounding_leaves_the_ends_and_straight_legs_where_they_are() -> None:
     way_m = rounded(np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 10.0]]))
-    np.testing.assert_array_equal(way_m[[0, -1]], [[0.0, 0.0], [10.0, 10.0]])
+    np.testing.assert_allclose(way_m[[0, -1]], [[0.0, 0.0], [10.0, 10.0]], atol=1e-12)
     straight_m = shapely.LineString([(0, 0), (10, 0), (10, 10)])
     assert max(straight_m.distance(shapely.Point(one)) for one in way_m) < 0.75
     assert np.linalg.norm(np.diff(way_m, axis=0), axis=1).max() <= 2.0 + 1e-9

@@ -66,7 +66,9 @@ def hauling(
     swing_deg = near_zero(excavator, float(np.rad2deg(place.bearing_to(bed_m))))
     leaves, returns = _ways(rng, truck, spot)
     road_s = float(leaves.time_s[-1] + returns.time_s[-1])
-    stances, counts, planned_s = dig(rng, arm, 0.0), [], 0.0
+    # The bucket has just been emptied.
+    stances = empty_over(rng, arm, swing_deg, reach_m, truck.height_m + OVER_BED_M)[-1:]
+    counts, planned_s = [], 0.0
     while planned_s < duration_s + _BEGUN_S:
         counts.append(int(rng.integers(*_LOADS_A_TRUCK)))
         away_s = road_s + 2.0 * _SETTLES_S + float(rng.uniform(*_UNLOADS_S))
