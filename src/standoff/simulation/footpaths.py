@@ -67,8 +67,8 @@ class Footpaths:
         if self.are_free(point_m[None])[0]:
             return point_m
         outside = self._avoided.buffer(_ROUND_M).boundary
-        line: FloatArray = shapely.get_coordinates(shapely.shortest_line(shapely.Point(point_m), outside))
-        return line[1]
+        line_m = shapely.get_coordinates(shapely.shortest_line(shapely.Point(point_m), outside))
+        return np.asarray(line_m[1])
 
     def _seen(self, starts_m: FloatArray, ends_m: FloatArray) -> FloatArray:
         """Return (N, M) how far points are from those that they see; 0, which is no edge, from others."""
