@@ -37,7 +37,7 @@ SCRIPTS: dict[str, tuple[tuple[MovingModel, ...], Script]] = {
         lambda rng: behaviour.hauling(rng, EXCAVATOR, TRUCK, ORIGIN, ORIGIN.moved(1.0, 7.8, 0.1), 8 * DURATION_S),
     ),
     "heaping": (
-        (LOADER,), lambda rng: behaviour.heaping(rng, LOADER, ORIGIN, ORIGIN.moved(-9.0, 9.0, -1.6), 2 * DURATION_S)
+        (LOADER,), lambda rng: behaviour.heaping(rng, LOADER, ORIGIN, ORIGIN.moved(-11.0, 11.0, -1.6), 2 * DURATION_S)
     ),
     "errand": (
         (WORKER,),

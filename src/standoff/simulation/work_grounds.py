@@ -173,7 +173,7 @@ def _heap(site: WorkSite) -> None:
     loader = make_wheel_loader(rng)
     for _ in range(_TRIES):
         pile, side = site.spot(6.0), float(rng.choice([-1.0, 1.0]))
-        heap = pile.moved(-9.0, side * 9.0, -side * np.pi / 2 + float(rng.normal(0.0, 0.1)))
+        heap = pile.moved(-11.0, side * 11.0, -side * np.pi / 2 + float(rng.normal(0.0, 0.1)))
         rough = shapely.LineString([pile.xy_m, pile.moved(-14.0, -side * 5.0).xy_m, heap.xy_m])
         if site.is_clear(rough.buffer(_REACH_M["wheel_loader"] + _APART_M)):
             site.add(loader, behaviour.heaping(rng, loader, pile, heap, site.stage.duration_s))

@@ -69,7 +69,7 @@ def heaping(rng: np.random.Generator, loader: Model, pile: Place, heap: Place, d
         rng: Decides on speeds and the moment to begin with.
         loader: With a bucket.
         pile: Loader's middle and heading with its bucket in the pile.
-        heap: The same where it empties the bucket; 8-15 m from `pile`, at about a right angle to it.
+        heap: The same where it empties the bucket; some 15 m from `pile`, at about a right angle to it.
         duration_s: Of the motion.
     """
     return fitted(_between(rng, loader, pile, heap, duration_s), loader)
