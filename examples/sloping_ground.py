@@ -15,8 +15,6 @@ import argparse
 from dataclasses import dataclass
 
 import numpy as np
-from standoff_sim.ground.terrain import Terrain, make_terrain
-from standoff_sim.ground.terrain_plan import TerrainPlan
 
 from standoff.core.camera import Camera, CameraPrior
 from standoff.core.errors import GroundError
@@ -27,6 +25,8 @@ from standoff.stages.frames.pictures import ArrayPicture
 from standoff.stages.ground import FusedGround, FusedParams, SurveyedGround
 from standoff.stages.locate import Locator
 from standoff.stages.proximity import ProximityMeter, ProximityParams
+from standoff_sim.ground.terrain import Terrain, make_terrain
+from standoff_sim.ground.terrain_plan import TerrainPlan
 
 SIZE_PX = (1280, 720)
 SLOPES_DEG = (0.0, 4.0, 8.0, 12.0)

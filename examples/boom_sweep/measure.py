@@ -21,12 +21,6 @@ from itertools import product
 
 import numpy as np
 from boom import Booms
-from standoff_sim.behaviour.digging import digging, grading
-from standoff_sim.clip.detection_noise import MEMORY_S, NOISE
-from standoff_sim.clip.truth import full_box_px
-from standoff_sim.machines.excavator import make_excavator
-from standoff_sim.movement.motion import Place, sample
-from standoff_sim.scene.scene import moved
 from sweep import out_of_sweep
 
 from standoff.core.camera import Camera
@@ -36,6 +30,12 @@ from standoff.core.pose import View
 from standoff.core.types import Tracks
 from standoff.stages.ground import map_from_view
 from standoff.stages.locate import Locator
+from standoff_sim.behaviour.digging import digging, grading
+from standoff_sim.clip.detection_noise import MEMORY_S, NOISE
+from standoff_sim.clip.truth import full_box_px
+from standoff_sim.machines.excavator import make_excavator
+from standoff_sim.movement.motion import Place, sample
+from standoff_sim.scene.scene import moved
 
 SIZE_PX = (1920, 1080)
 STEP_S, LASTS_S, STRUCK_WITHIN_S = 0.2, 30.0, 3.0

@@ -20,7 +20,6 @@ import numpy.typing as npt
 import pyarrow.parquet as pq
 from scipy.optimize import minimize
 from scipy.special import logit
-from standoff_sim.clip.detection_noise import GROUPS, ClassNoise, size_of
 
 from standoff.core.boxes import areas_px2, shared_px2
 from standoff.core.classes import CLASSES
@@ -28,6 +27,7 @@ from standoff.core.homography import FloatArray
 from standoff.core.types import Detections, Frame
 from standoff.stages.detect import OnnxDetector, find_model
 from standoff.stages.frames import frame_from_array, open_source
+from standoff_sim.clip.detection_noise import GROUPS, ClassNoise, size_of
 
 IntArray = npt.NDArray[np.int64]
 Tracks = dict[tuple[str, int], list[tuple[float, FloatArray]]]

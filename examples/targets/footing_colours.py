@@ -7,12 +7,12 @@ are lit by the sun or lie in their own shade. The light and the soils are those 
 from __future__ import annotations
 
 import numpy as np
+
+from standoff.core.homography import FloatArray
 from standoff_sim.clip.presets import Condition
 from standoff_sim.ground.soil_colours import PALETTES
 from standoff_sim.scene.light import level_luminance, random_light
 from standoff_sim.scene.scene import Light
-
-from standoff.core.homography import FloatArray
 
 PAINTS = {
     "bare concrete": "#d2cec4",

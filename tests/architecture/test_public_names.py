@@ -8,9 +8,9 @@ import subprocess
 import sys
 
 import pytest
-import standoff_sim
 
 import standoff
+import standoff_sim
 
 PUBLIC_NAMES = {
     "standoff.cli": {"app", "main"},
@@ -97,9 +97,10 @@ PUBLIC_NAMES = {
     },
     "standoff.training.my_site": {"prepare_plan", "read_preset"},
     "standoff_sim.behaviour": {
-        "carrying_between", "crossing_behind", "digging", "dozing", "driving_through", "grading", "idle",
-        "keep_distance", "loader_loading", "near_miss", "pair_talking", "random_stance", "rolling", "spreading",
-        "standing_working", "stooping", "truck_loading", "walking_past",
+        "carrying_between", "crossing_behind", "digging", "dozing", "driving_off", "driving_through", "errand",
+        "grading", "hauling", "heaping", "idle", "keep_distance", "loader_loading", "near_miss", "pair_talking",
+        "random_stance", "riding", "rolling", "spreading", "standing_working", "staying", "stooping", "truck_loading",
+        "walking_past",
     },
     "standoff_sim.render": {"Cutout", "Look", "Rendered", "Renderer"},
 }  # fmt: skip

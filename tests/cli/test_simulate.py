@@ -9,6 +9,7 @@ import moderngl
 import pytest
 from cli.calling import Call
 from laws import few
+
 from standoff_sim.clip.presets import MAX_SEED, PRESETS
 
 _CLIP = ("--frames", 1, "--size", "160x90", "--processes", 1)

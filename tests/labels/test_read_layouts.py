@@ -10,12 +10,12 @@ import pytest
 import supervision as sv
 import yaml
 from labelled_sets import by_stem, kinds, write_mixture, write_picture, write_yolo
-from standoff_sim.clip.picture_set import yolo_line
 from tolerances import PEER_BOX_PX
 
 from standoff.core.classes import CLASSES
 from standoff.core.errors import DataError
 from standoff.labels import LabelledData, load_picture, read_data
+from standoff_sim.clip.picture_set import yolo_line
 
 _SIZES = ((64, 48), (97, 31), (640, 360))
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from standoff_sim.scene.scene import Light
-from standoff_sim.solids.mesh import Float32Array
 
 from standoff.core.camera import Camera
 from standoff.core.homography import FloatArray
 from standoff.core.pose import View
+from standoff_sim.scene.scene import Light
+from standoff_sim.solids.mesh import Float32Array
 
 SUN = (0.8, 0.76, 0.7)
 SKY = (0.2, 0.24, 0.3)

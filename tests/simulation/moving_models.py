@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from standoff_sim.scene.scene import Batch
 
 from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.homography import FloatArray
+from standoff_sim.scene.scene import Batch
 
 _FAR = (-1e5, 1e5)
 _JOINTS: Mapping[str, Mapping[str, tuple[float, float]]] = {

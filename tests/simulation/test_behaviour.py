@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from laws import seeds
 from simulation.moving_models import MovingModel
+
 from standoff_sim import behaviour
 from standoff_sim.behaviour.digging import RATES_PS
 from standoff_sim.behaviour.encounters import least_distance_m
@@ -30,6 +31,17 @@ SCRIPTS: dict[str, tuple[tuple[MovingModel, ...], Script]] = {
     "loader_loading": (
         (LOADER, TRUCK),
         lambda rng: behaviour.loader_loading(rng, LOADER, TRUCK, ORIGIN, ORIGIN.moved(-6.0, 10.0), 2 * DURATION_S),
+    ),
+    "hauling": (
+        (EXCAVATOR, TRUCK),
+        lambda rng: behaviour.hauling(rng, EXCAVATOR, TRUCK, ORIGIN, ORIGIN.moved(1.0, 7.8, 0.1), 8 * DURATION_S),
+    ),
+    "heaping": (
+        (LOADER,), lambda rng: behaviour.heaping(rng, LOADER, ORIGIN, ORIGIN.moved(-11.0, 11.0, -1.6), 2 * DURATION_S)
+    ),
+    "errand": (
+        (WORKER,),
+        lambda rng: behaviour.errand(rng, WORKER, ORIGIN, np.array([[0.0, 0.0], [6.0, 2.0], [9.0, 9.0]]), DURATION_S),
     ),
     "spreading": ((LOADER,), lambda rng: behaviour.spreading(rng, LOADER, ORIGIN, 14.0, DURATION_S)),
     "tipping": ((TRUCK,), lambda rng: behaviour.spreading(rng, TRUCK, ORIGIN, 14.0, DURATION_S)),

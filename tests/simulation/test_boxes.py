@@ -5,6 +5,7 @@ import trimesh
 from hypothesis import example, given
 from hypothesis import strategies as st
 from laws import examples
+
 from standoff_sim.solids.mesh import Mesh, Surface, box
 
 SIDE_M = st.floats(0.002, 60.0)

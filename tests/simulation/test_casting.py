@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 import shapely
 from laws import few, seeds
-from standoff_sim.behaviour import idle
-from standoff_sim.movement.motion import Place, sample
-from standoff_sim.people.worker import make_worker
-from standoff_sim.scene.casting import CASTS, Cast, Stage, crowd, is_person, swept
-from standoff_sim.scene.scene import Actor
 from tolerances import GEOMETRY_REL
 
 from standoff.core.classes import CLASS_BY_NAME, CLASSES
+from standoff_sim.behaviour import idle
+from standoff_sim.movement.motion import Place, sample
+from standoff_sim.people.worker import make_worker
+from standoff_sim.scene.cast import Cast, Stage, is_person, swept
+from standoff_sim.scene.casting import CASTS, crowd
+from standoff_sim.scene.scene import Actor
 
 _LASTING_S = 4.0
 _STAGE = Stage(30.0, 1.0, _LASTING_S, None, (-3.0, -2.0))

@@ -7,9 +7,9 @@ from contextlib import contextmanager
 from functools import partial
 
 import pytest
-from standoff_sim.clip.crew import _Hand, work_through
 
 from standoff.core.errors import DataError, SimulationError
+from standoff_sim.clip.crew import _Hand, work_through
 
 
 @contextmanager

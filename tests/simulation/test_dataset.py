@@ -13,14 +13,14 @@ import pytest
 import yaml
 from laws import seeds
 from pycocotools.coco import COCO
-from standoff_sim.clip.dataset import DatasetPlan, record_dataset
-from standoff_sim.clip.picture_set import is_marked
 
 from standoff.core.classes import CLASSES
 from standoff.core.errors import ConfigError, OutputError
 from standoff.labels import LabelledPicture, read_data
 from standoff.labels.types import SPLITS
 from standoff.labels.views import read_views
+from standoff_sim.clip.dataset import DatasetPlan, record_dataset
+from standoff_sim.clip.picture_set import is_marked
 
 _SIZE_PX = (192, 108)
 _PLAN = DatasetPlan(

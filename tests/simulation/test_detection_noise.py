@@ -8,6 +8,10 @@ import numpy as np
 import pyarrow as pa
 import pytest
 from scipy.special import expit, logit
+
+from standoff.clips import NOISY_DETECTIONS_SCHEMA
+from standoff.core.classes import CLASSES
+from standoff.core.homography import FloatArray
 from standoff_sim.clip.detection_noise import (
     GROUPS,
     LEAST_SCORE,
@@ -16,10 +20,6 @@ from standoff_sim.clip.detection_noise import (
     NoisyDetector,
     size_of,
 )
-
-from standoff.clips import NOISY_DETECTIONS_SCHEMA
-from standoff.core.classes import CLASSES
-from standoff.core.homography import FloatArray
 
 _SIZE_PX = (1280, 720)
 _SIDES = ("x1_px", "y1_px", "x2_px", "y2_px")

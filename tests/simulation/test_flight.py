@@ -7,6 +7,9 @@ import cv2
 import numpy as np
 import pytest
 from laws import seeds
+from tolerances import GEOMETRY_REL
+
+from standoff.core.homography import apply
 from standoff_sim.camera.flight import (
     ShakenFlight,
     Still,
@@ -17,9 +20,6 @@ from standoff_sim.camera.flight import (
 )
 from standoff_sim.clip.presets import FlightStyle
 from standoff_sim.movement.band_noise import BandNoise
-from tolerances import GEOMETRY_REL
-
-from standoff.core.homography import apply
 
 STYLES: tuple[FlightStyle, ...] = get_args(FlightStyle)
 TARGET_M = np.array([4.0, -3.0])

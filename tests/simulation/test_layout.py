@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import shapely
 from laws import seeds
+
 from standoff_sim.ground.terrain import Terrain
 from standoff_sim.ground.terrain_plan import TerrainPlan
 from standoff_sim.props.clutter import CLUTTER

@@ -4,6 +4,7 @@ from typing import get_args
 
 import numpy as np
 import pytest
+
 from standoff_sim.clip.presets import Condition
 from standoff_sim.scene.light import level_luminance, random_light
 

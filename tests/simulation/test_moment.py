@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
+from standoff.core.classes import CLASS_BY_NAME
 from standoff_sim.clip.presets import CoverPlan, Plan, plan_clip
 from standoff_sim.clip.studio import Studio
 from standoff_sim.scene.moment import Moment, scene_at
 from standoff_sim.scene.scene import NOTHING, Scene
 from standoff_sim.scene.site import Site, build_site
-
-from standoff.core.classes import CLASS_BY_NAME
 
 
 def _plan(name: str, seed: int = 1) -> Plan:

@@ -8,6 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from laws import seeds
 from simulation.moving_models import MovingModel
+from tolerances import GEOMETRY_REL
+
+from standoff.core.homography import FloatArray
 from standoff_sim.movement.driving import MOBILITY, drive, walk
 from standoff_sim.movement.motion import (
     STEP_S,
@@ -27,9 +30,6 @@ from standoff_sim.movement.motion import (
     wrapped,
 )
 from standoff_sim.scene.scene import Ground, Motion
-from tolerances import GEOMETRY_REL
-
-from standoff.core.homography import FloatArray
 
 angles = st.floats(-3.1, 3.1)
 offsets = st.floats(-40.0, 40.0)

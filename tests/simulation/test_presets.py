@@ -3,9 +3,9 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from standoff_sim.clip.presets import PRESETS, plan_clip
 
 from standoff.core.errors import ConfigError
+from standoff_sim.clip.presets import PRESETS, plan_clip
 
 
 def test_the_papers_tests_have_the_papers_numbers() -> None:

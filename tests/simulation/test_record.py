@@ -8,8 +8,6 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from laws import seeds
-from standoff_sim.clip.presets import Plan, plan_clip
-from standoff_sim.clip.record import frame_times_s, record_clip
 from tolerances import GEOMETRY_REL
 
 from standoff.clips import CLIP_FORMAT, CLIP_FRAMES_SCHEMA, PAIRS_SCHEMA, TRUTH_SCHEMA
@@ -17,6 +15,8 @@ from standoff.config import load_settings
 from standoff.core.errors import OutputError
 from standoff.stages.frames import open_source
 from standoff.stages.ground import load_camera
+from standoff_sim.clip.presets import Plan, plan_clip
+from standoff_sim.clip.record import frame_times_s, record_clip
 
 _FRAMES = 3
 _FILES = {

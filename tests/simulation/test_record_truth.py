@@ -10,13 +10,13 @@ import moderngl
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from standoff_sim.clip.presets import Plan, plan_clip
-from standoff_sim.clip.record import record_cameras, record_clip, record_truth
 from tolerances import GEOMETRY_REL
 
 from standoff.clips import CLIP_FRAMES_SCHEMA, DEVICES_SCHEMA, NOISY_DETECTIONS_SCHEMA, PAIRS_SCHEMA, TRUTH_SCHEMA
 from standoff.config import load_settings
 from standoff.core.homography import FloatArray
+from standoff_sim.clip.presets import Plan, plan_clip
+from standoff_sim.clip.record import record_cameras, record_clip, record_truth
 
 _FRAMES = 3
 _SCHEMAS = {

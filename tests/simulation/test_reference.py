@@ -6,6 +6,9 @@ import shapely
 import trimesh
 from laws import seeds
 from scipy.interpolate import LinearNDInterpolator
+
+from standoff.core.errors import ConfigError
+from standoff.core.homography import FloatArray
 from standoff_sim.ground.terrain import Terrain
 from standoff_sim.ground.terrain_plan import TerrainPlan
 from standoff_sim.scene.covers import COVER_KINDS, make_cover
@@ -17,9 +20,6 @@ from standoff_sim.scene.reference import (
     make_reference,
 )
 from standoff_sim.scene.scene import Batch, Reference
-
-from standoff.core.errors import ConfigError
-from standoff.core.homography import FloatArray
 
 LEVEL_M = 1.25
 CENTRE_M = (7.3, -11.6)

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 import tolerances
 from simulation.flat_ground import FlatGround, camera, light, view
-from standoff_sim.render import Look, Rendered, Renderer
-from standoff_sim.scene.scene import Batch, place
-from standoff_sim.solids.mesh import Surface, box, join, rotation, srgb, translation
 
 from standoff.core.camera import Camera
 from standoff.core.errors import MissingDependency
 from standoff.core.homography import FloatArray
 from standoff.core.pose import View
+from standoff_sim.render import Look, Rendered, Renderer
+from standoff_sim.scene.scene import Batch, place
+from standoff_sim.solids.mesh import Surface, box, join, rotation, srgb, translation
 
 BARREL = (-0.12, 0.03, 0.001, -0.0008, 0.0)
 LENSES = [camera(), camera(distortion=BARREL), camera(distortion=(0.08, 0.0, 0.0, 0.0, 0.0))]

@@ -7,12 +7,12 @@ from typing import get_args
 import av
 import numpy as np
 import pytest
-from standoff_sim.camera.sensor import Sensor, VideoWriter, drone_bit_rate_bps
-from standoff_sim.clip.presets import Condition
 from tolerances import SWSCALE_LEVELS
 
 from standoff.core.types import ImageArray
 from standoff.stages.frames import open_source
+from standoff_sim.camera.sensor import Sensor, VideoWriter, drone_bit_rate_bps
+from standoff_sim.clip.presets import Condition
 
 CONDITIONS: tuple[Condition, ...] = get_args(Condition)
 PLAIN = replace(Sensor.of("noon"), smear_levels=0.0, sharpening=0.0)

@@ -3,8 +3,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
-from standoff_sim.solids.shading import shade
 from tolerances import GEOMETRY_REL
+
+from standoff_sim.solids.shading import shade
 
 _BENT = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 1]], [[0, 1, 2], [0, 2, 3]])
 _SOLIDS = {

@@ -3,6 +3,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from simulation.flat_ground import FlatGround
+from tolerances import HULL_BOX_PX, SURVEYED_BOX_PX, SURVEYED_SHARE
+
+from standoff.core.camera import Camera
+from standoff.core.homography import FloatArray
 from standoff_sim.camera.flight import Still
 from standoff_sim.clip.presets import plan_clip
 from standoff_sim.clip.studio import Studio
@@ -18,10 +22,6 @@ from standoff_sim.scene.sights import Outlines
 from standoff_sim.scene.site import build_site
 from standoff_sim.solids.lumps import cut, lumps_of
 from standoff_sim.solids.mesh import box, join, translation, tube
-from tolerances import HULL_BOX_PX, SURVEYED_BOX_PX, SURVEYED_SHARE
-
-from standoff.core.camera import Camera
-from standoff.core.homography import FloatArray
 
 _SIDES = ("x1_px", "y1_px", "x2_px", "y2_px")
 _CAMERA = Camera(

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
 from standoff_sim.clip.presets import Condition, plan_clip
 from standoff_sim.clip.studio import Studio
 from standoff_sim.scene.site import Site, build_site

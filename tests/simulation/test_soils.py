@@ -8,14 +8,14 @@ import cv2
 import numpy as np
 import pytest
 from laws import seeds
+
+from standoff.core.homography import FloatArray
 from standoff_sim.ground.canvas import Canvas, fractal
 from standoff_sim.ground.ground_marks import draw_prints
 from standoff_sim.ground.relief import make_relief
 from standoff_sim.ground.soil_colours import PALETTES, palette_of
 from standoff_sim.ground.soils import paint_ground
 from standoff_sim.ground.terrain_plan import Path, Pit, Slab, Soil, TerrainPlan
-
-from standoff.core.homography import FloatArray
 
 _STRIP_M = (120.0, 40.0)
 _SQUARE: Path = ((10.0, 15.0), (25.0, 15.0), (25.0, 30.0), (10.0, 30.0))

@@ -6,17 +6,18 @@ import numpy as np
 import pytest
 from laws import seeds
 from simulation.flat_ground import FlatGround, camera, light
+from tolerances import GEOMETRY_REL
+
+from standoff.core.homography import FloatArray
 from standoff_sim.behaviour import standing_working, stooping, walking_past
 from standoff_sim.camera.flight import Still
 from standoff_sim.clip.truth import full_box_px
 from standoff_sim.movement.motion import Place, sample
 from standoff_sim.people.worker import make_worker
-from standoff_sim.scene.casting import CASTS, Cast, Stage, bend_over, is_person
+from standoff_sim.scene.cast import Cast, Stage, is_person
+from standoff_sim.scene.casting import CASTS, bend_over
 from standoff_sim.scene.moment import scene_at
 from standoff_sim.scene.scene import Actor, Scene
-from tolerances import GEOMETRY_REL
-
-from standoff.core.homography import FloatArray
 
 _LASTING_S = 60.0
 

@@ -8,6 +8,8 @@ from functools import partial
 import numpy as np
 import pytest
 from laws import seeds
+
+from standoff.core.homography import FloatArray
 from standoff_sim.ground.terrain import Terrain
 from standoff_sim.ground.terrain_plan import TerrainPlan
 from standoff_sim.scene.scene import NOTHING, PARKED, Batch
@@ -24,8 +26,6 @@ from standoff_sim.surroundings.vegetation import (
     far_tree,
     tree,
 )
-
-from standoff.core.homography import FloatArray
 
 _PLANTS = [
     *(partial(tree, i) for i in range(TREE_VARIANTS)),

@@ -6,6 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from laws import seeds
+
+from standoff.core.homography import FloatArray
+from standoff.core.pose import View
 from standoff_sim.camera.flight import ShakenFlight, drone_camera, make_flight
 from standoff_sim.camera.telemetry import (
     Origin,
@@ -13,9 +16,6 @@ from standoff_sim.camera.telemetry import (
     write_telemetry,
 )
 from standoff_sim.clip.presets import FlightStyle
-
-from standoff.core.homography import FloatArray
-from standoff.core.pose import View
 
 TIMES_S = np.cumsum(np.random.default_rng(0).uniform(0.03, 0.05, 200)) - 0.03
 BLOCK = re.compile(

@@ -11,6 +11,7 @@ import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
 from laws import examples, few, seeds
+
 from standoff_sim.ground.relief import beside, grid_shape, make_relief
 from standoff_sim.ground.site_plans import SiteStyle, random_plan
 from standoff_sim.ground.terrain import Terrain, make_terrain

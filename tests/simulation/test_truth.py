@@ -5,6 +5,11 @@ import numpy as np
 import pytest
 from laws import seeds
 from pycocotools import mask as coco_mask
+from tolerances import HULL_BOX_PX
+
+from standoff.clips import PAIRS_SCHEMA, TRUTH_SCHEMA
+from standoff.core.camera import Camera
+from standoff.core.pose import View
 from standoff_sim.clip.coco import Annotations
 from standoff_sim.clip.truth import (
     entity_rows,
@@ -16,11 +21,6 @@ from standoff_sim.clip.truth import (
 from standoff_sim.scene.moment import Body, Moment
 from standoff_sim.scene.scene import place
 from standoff_sim.solids.mesh import ball, box, rotation, srgb, translation
-from tolerances import HULL_BOX_PX
-
-from standoff.clips import PAIRS_SCHEMA, TRUTH_SCHEMA
-from standoff.core.camera import Camera
-from standoff.core.pose import View
 
 _CAMERA = Camera(
     640, 360, np.array([[480.0, 0.0, 319.5], [0.0, 480.0, 179.5], [0.0, 0.0, 1.0]]), np.array([-0.12, 0.03, 0, 0, 0])

@@ -9,14 +9,6 @@ import numpy as np
 import pytest
 from laws import seeds
 from simulation.flat_ground import FlatGround
-from standoff_sim.camera.flight import Still, drone_camera
-from standoff_sim.clip.presets import PRESETS, plan_clip
-from standoff_sim.clip.studio import Shot, Studio
-from standoff_sim.movement.motion import sample
-from standoff_sim.render import Look, Renderer
-from standoff_sim.scene.light import random_light
-from standoff_sim.scene.reference import make_reference
-from standoff_sim.scene.site import Site, build_site
 from tolerances import (
     BOARD_IN_PICTURE_PX,
     DISTORTION_PX,
@@ -27,6 +19,14 @@ from tolerances import (
 )
 
 from standoff.core.homography import FloatArray
+from standoff_sim.camera.flight import Still, drone_camera
+from standoff_sim.clip.presets import PRESETS, plan_clip
+from standoff_sim.clip.studio import Shot, Studio
+from standoff_sim.movement.motion import sample
+from standoff_sim.render import Look, Renderer
+from standoff_sim.scene.light import random_light
+from standoff_sim.scene.reference import make_reference
+from standoff_sim.scene.site import Site, build_site
 
 pytestmark = pytest.mark.usefixtures("opengl")
 

@@ -5,13 +5,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from laws import seeds
+
+from standoff.core.homography import FloatArray
+from standoff.core.pose import View
 from standoff_sim.camera.viewpoints import Obstacles, Passing, draw_flight, draw_view
 from standoff_sim.scene.moment import Body
 from standoff_sim.scene.scene import Batch, place
 from standoff_sim.solids.mesh import Surface, box, rotation, scaling, translation
-
-from standoff.core.homography import FloatArray
-from standoff.core.pose import View
 
 _SIZE_PX = (320, 180)
 _NOTHING = Obstacles.of(())

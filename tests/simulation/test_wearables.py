@@ -4,6 +4,11 @@ import numpy as np
 import pyarrow as pa
 import pytest
 from simulation.flat_ground import FlatGround
+from tolerances import GEOMETRY_REL
+
+from standoff.clips import DEVICES_SCHEMA
+from standoff.core.camera import Camera
+from standoff.core.homography import FloatArray
 from standoff_sim.behaviour import idle, walking_past
 from standoff_sim.camera.flight import Still
 from standoff_sim.camera.telemetry import Origin
@@ -23,11 +28,6 @@ from standoff_sim.people.worker import make_worker
 from standoff_sim.scene.light import random_light
 from standoff_sim.scene.scene import Actor, Batch, Scene, place
 from standoff_sim.solids.mesh import box, translation
-from tolerances import GEOMETRY_REL
-
-from standoff.clips import DEVICES_SCHEMA
-from standoff.core.camera import Camera
-from standoff.core.homography import FloatArray
 
 _LASTING_S = 500.0
 _ORIGIN = Origin.draw(np.random.default_rng(9))

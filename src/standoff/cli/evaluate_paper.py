@@ -12,9 +12,8 @@ import typer
 from standoff.core.errors import ConfigError, StandoffError
 
 if TYPE_CHECKING:
-    from standoff_sim.clip.presets import Plan
-
     from standoff.evaluation.paper import BoxError, ClipResult, Trial
+    from standoff_sim.clip.presets import Plan
 
 Method = Literal["fused", "refined", "paper", "paper+tls", "oriented"]
 Anchor = Literal["ground_point", "bottom_centre", "box_centre"]
@@ -168,9 +167,8 @@ def _evaluate_all(
 
 
 def _render(plan: Plan, folder: Path) -> None:
-    from standoff_sim.clip.record import record_clip
-
     from standoff.cli.console import progress
+    from standoff_sim.clip.record import record_clip
 
     with progress(f"rendering {plan.name}", plan.preset.frames) as on_frame:
         record_clip(plan, folder, on_frame=on_frame)

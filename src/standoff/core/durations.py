@@ -1,39 +1,44 @@
-"""Medians of any number of durations in a fixed amount of memory."""
+"""Whether something has lasted long enough: times of frames are sums and differences of rounded numbers.
+
+A fifth of a second after 0.4 s is 0.6000000000000001 s, or 0.19999999999999996 s later: compared to the letter, every
+other frame of a film at five frames a second would be too early.
+"""
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 
-_STEP = 1.01
-_SMALLEST_MS = 1e-3
-_BINS = 2400
+from standoff.core.homography import BoolArray, FloatArray
+
+ROUNDING_S: Final = 1e-6
+"""No two frames are so near, and no sum of a day of frame times is off by so much."""
 
 
-class Durations:
-    """A histogram with bins one per cent wide, so that its quantiles are good to half a per cent."""
+def has_lasted(since_s: float, time_s: float, duration_s: float) -> bool:
+    """Tell whether a duration is over.
 
-    def __init__(self) -> None:
-        self._counts = np.zeros(_BINS, dtype=np.int64)
-        self._total_ms = 0.0
+    >>> has_lasted(0.6, 0.8, 0.2), 0.8 - 0.6 >= 0.2
+    (True, False)
+    """
+    return time_s - since_s >= duration_s - ROUNDING_S
 
-    def add(self, duration_ms: float) -> None:
-        """Count one duration."""
-        steps = np.log(max(duration_ms, _SMALLEST_MS) / _SMALLEST_MS) / np.log(_STEP)
-        self._counts[min(int(steps), _BINS - 1)] += 1
-        self._total_ms += duration_ms
 
-    def quantile_ms(self, fraction: float) -> float:
-        """Return the duration that this fraction of them does not exceed; NaN when there are none."""
-        below = np.cumsum(self._counts)
-        if below[-1] == 0:
-            return float("nan")
-        step = int(np.searchsorted(below, fraction * below[-1], side="left"))
-        return float(_SMALLEST_MS * _STEP ** (step + 0.5))
+def have_lasted(lasting_s: FloatArray, duration_s: float) -> BoolArray:
+    """Tell (N,) which of some times (N,) are as long as a duration; NaN is not.
 
-    def summary(self) -> dict[str, float]:
-        """Return median, 90th percentile and total, in milliseconds."""
-        return {
-            "median_ms": round(self.quantile_ms(0.5), 4),
-            "p90_ms": round(self.quantile_ms(0.9), 4),
-            "total_ms": round(self._total_ms, 1),
-        }
+    >>> have_lasted(np.array([59.9999999, 59.9, np.nan]), 60.0).tolist()
+    [True, False, False]
+    """
+    lasted: BoolArray = np.asarray(lasting_s >= duration_s - ROUNDING_S)
+    return lasted
+
+
+def is_apart(before_s: float, time_s: float, longest_s: float) -> bool:
+    """Tell whether two moments are further apart than a duration.
+
+    >>> is_apart(0.4, 0.6000000000000001, 0.2), 0.6000000000000001 - 0.4 > 0.2
+    (False, True)
+    """
+    return time_s - before_s > longest_s + ROUNDING_S

@@ -17,7 +17,6 @@ import numpy as np
 
 from standoff.core.classes import CLASSES
 from standoff.core.homography import FloatArray
-from standoff.core.roles import IS_EQUIPMENT
 from standoff.core.types import IntArray
 
 
@@ -27,7 +26,7 @@ class _Motion(NamedTuple):
 
 
 _MOTION_OF: Final = {
-    "worker": _Motion(0.9, 1.5),
+    "worker": _Motion(0.9, 4.0),
     "excavator": _Motion(0.3, 1.0),
     "wheel_loader": _Motion(1.5, 3.0),
     "dump_truck": _Motion(2.0, 4.0),
@@ -40,7 +39,11 @@ SPEED_MPS: Final = np.array([_MOTION_OF[site_class.name].speed_mps for site_clas
 MEMORY_S: Final = np.array([_MOTION_OF[site_class.name].memory_s for site_class in CLASSES])
 """(C,) after so many seconds a third of a velocity is left, by class."""
 _STANDING_S, _STARTING_SHARE = 2.0, 0.4
-"""A machine that stood for so long gets no further in three seconds than some metre, other than one that drives."""
+"""Who stood for so long, a machine or somebody at work, gets no further in three seconds than some metre, other than
+one that is on its way."""
+
+_PLACES, _PLACE_BY_SPEED, _SPEED_BY_PLACE, _SPEEDS = (slice(start, start + 6, 5) for start in (0, 2, 8, 10))
+"""Entries of a (4, 4) matrix, row by row: x of x and y of y, x of vx and y of vy, and so on."""
 
 _PLACES, _PLACE_BY_SPEED, _SPEED_BY_PLACE, _SPEEDS = (slice(start, start + 6, 5) for start in (0, 2, 8, 10))
 """Entries of a (4, 4) matrix, row by row: x of x and y of y, x of vx and y of vy, and so on."""
@@ -68,11 +71,11 @@ def wandering(class_id: IntArray, step_s: float, standing_s: FloatArray | None =
     Args:
         class_id: (N,) ids of `CLASSES`.
         step_s: Not negative.
-        standing_s: (N,) for how long each has not moved: machines that stand start slowly. Left out: all move.
+        standing_s: (N,) for how long each has not moved: who stands starts slowly. Left out: all move.
     """
     memory_s, variance = MEMORY_S[class_id], SPEED_MPS[class_id] ** 2
     if standing_s is not None:
-        variance = np.where((standing_s >= _STANDING_S) & IS_EQUIPMENT[class_id], _STARTING_SHARE**2, 1.0) * variance
+        variance = np.where(standing_s >= _STANDING_S, _STARTING_SHARE**2, 1.0) * variance
     steps = step_s / memory_s
     left = np.exp(-steps)
     matrix = np.zeros((len(class_id), 16))

@@ -10,9 +10,9 @@ from contextlib import closing
 from dataclasses import replace
 from typing import Any
 
-from standoff.core.durations import Durations
 from standoff.core.errors import OutputError
 from standoff.core.protocols import Described, Sink, Source
+from standoff.core.stage_durations import Durations
 from standoff.core.types import FrameResult, Outcome
 from standoff.monitor.fan_out import FanOut
 from standoff.monitor.look_ahead import Ahead, look_ahead, one_by_one

@@ -12,8 +12,6 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
-from standoff_sim.clip.presets import plan_clip
-from standoff_sim.clip.record import record_truth
 
 from standoff.core import homography, protocols
 from standoff.core.classes import CLASS_BY_NAME
@@ -30,6 +28,8 @@ from standoff.stages.proximity import ProximityMeter
 from standoff.stages.sinks import FRAMES, PROXIMITY, ZONED_TRACKS, TableSink
 from standoff.stages.track import Tracker
 from standoff.stages.watched import GroundWatcher
+from standoff_sim.clip.presets import plan_clip
+from standoff_sim.clip.record import record_truth
 
 _TURN_RAD, _SHIFT_M, _FOCAL = 0.003, 0.1, 0.005
 """Standard errors of the view: some decimetres on the ground, 30 m away."""

@@ -13,12 +13,12 @@ import pytest
 import tolerances
 from evaluation.paper import drawn_board
 from pages import without_pictures
-from standoff_sim.clip.presets import PRESETS, Plan
 from typer.testing import CliRunner
 
 from standoff.cli.app import app
 from standoff.core.errors import ConfigError, SimulationError
 from standoff.evaluation.paper.published import PUBLISHED
+from standoff_sim.clip.presets import PRESETS, Plan
 
 
 def evaluate(*words: object) -> str:

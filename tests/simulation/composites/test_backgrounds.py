@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 import pytest
 import yaml
-from standoff_sim.composites.backgrounds import Background, find_backgrounds, split_backgrounds
 
 from standoff.core.errors import DataError
+from standoff_sim.composites.backgrounds import Background, find_backgrounds, split_backgrounds
 
 
 def _photograph(path: Path) -> Path:

@@ -3,6 +3,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 import pytest
+
 from standoff_sim.composites.blending import Match, blend, decoded, encoded
 from standoff_sim.render import Cutout
 

@@ -7,13 +7,13 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 from simulation.flat_ground import FlatGround, camera, light, view
+
+from standoff.core.homography import FloatArray
+from standoff.core.pose import View
 from standoff_sim.composites.blending import decoded
 from standoff_sim.render import Look, Renderer
 from standoff_sim.scene.scene import Batch, place
 from standoff_sim.solids.mesh import box, rotation, srgb, translation
-
-from standoff.core.homography import FloatArray
-from standoff.core.pose import View
 
 _LINEAR = Look(exposure=0.5)
 """Dark enough to stay below the tone curve's knee."""

@@ -5,10 +5,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from standoff_sim.composites.backgrounds import Background
-from standoff_sim.composites.framing import Framed, frame
 
 from standoff.core.errors import DataError
+from standoff_sim.composites.backgrounds import Background
+from standoff_sim.composites.framing import Framed, frame
 
 _SIZE_PX = (320, 180)
 _MARK_PX = np.array([[560.0, 300.0, 660.0, 340.0]])

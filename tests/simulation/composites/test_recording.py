@@ -9,10 +9,10 @@ import cv2
 import numpy as np
 import pytest
 import yaml
-from standoff_sim.composites.recording import CompositePlan, record_composites
 
 from standoff.core.classes import CLASSES
 from standoff.core.errors import ConfigError
+from standoff_sim.composites.recording import CompositePlan, record_composites
 
 _SIZE_PX = (320, 180)
 _FLIGHTS = ("field", "park", "yard")

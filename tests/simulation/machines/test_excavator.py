@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 import shapely
 from laws import seeds
+
+from standoff.core.classes import CLASS_BY_NAME
+from standoff.core.homography import FloatArray
 from standoff_sim.machines.digging import Link
 from standoff_sim.machines.excavator import LIMITS, Excavator, build_excavator, make_excavator, reach
 from standoff_sim.machines.excavator_sizes import SIZES
 from standoff_sim.scene.scene import Batch
-
-from standoff.core.classes import CLASS_BY_NAME
-from standoff.core.homography import FloatArray
 
 _TRIANGLES = 8000
 _BOUNDED = ("boom_deg", "arm_deg", "bucket_deg")

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tolerances import GEOMETRY_REL
+
 from standoff_sim.machines.digging import knee_m
 from standoff_sim.machines.joints import settle
 from standoff_sim.machines.machine_parts import Crawler, Ram, cab, ram_poses, scoop, strut_pose, wheel
@@ -11,7 +13,6 @@ from standoff_sim.machines.paint import Painted, draw_livery, weather
 from standoff_sim.machines.running_gear import Axles, Tracks
 from standoff_sim.solids.heap import soil_heap
 from standoff_sim.solids.mesh import Mesh, srgb
-from tolerances import GEOMETRY_REL
 
 _CRAWLER = Crawler(4.4, 0.95, 0.6, 45)
 _coordinate = st.floats(-5.0, 5.0)

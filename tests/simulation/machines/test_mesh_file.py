@@ -7,12 +7,12 @@ import cv2
 import numpy as np
 import pytest
 import trimesh
+
+from standoff.core.errors import DataError
 from standoff_sim.machines.digging import Link
 from standoff_sim.machines.excavator import Excavator, build_excavator, reach
 from standoff_sim.machines.excavator_sizes import SIZES
 from standoff_sim.machines.mesh_file import BUDGET, PARTS, load_excavator
-
-from standoff.core.errors import DataError
 
 _SIZES_M = {
     "crawler": ((4.4, 2.8, 1.0), (0.2, 0.0, 0.5)),

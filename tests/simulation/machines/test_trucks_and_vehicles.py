@@ -7,14 +7,14 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 import shapely
+
+from standoff.core.classes import CLASSES
+from standoff.core.homography import FloatArray
 from standoff_sim.machines.dozer import Dozer, make_dozer
 from standoff_sim.machines.dump_truck import Hauler, Tipper, make_dump_truck
 from standoff_sim.machines.roller import Roller, make_roller
 from standoff_sim.machines.vehicle import Car, Truck, make_car, make_truck, make_vehicle
 from standoff_sim.scene.scene import Batch
-
-from standoff.core.classes import CLASSES
-from standoff.core.homography import FloatArray
 
 Machine = Tipper | Hauler | Roller | Dozer | Car | Truck
 Maker = Callable[[np.random.Generator], Machine]

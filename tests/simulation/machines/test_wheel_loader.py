@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 import shapely
 from laws import seeds
+
+from standoff.core.classes import CLASS_BY_NAME
+from standoff.core.homography import FloatArray
 from standoff_sim.machines.loader_meshes import SIZES
 from standoff_sim.machines.wheel_loader import (
     LIMITS,
@@ -18,9 +21,6 @@ from standoff_sim.machines.wheel_loader import (
     tilt_pivot_m,
 )
 from standoff_sim.scene.scene import Batch
-
-from standoff.core.classes import CLASS_BY_NAME
-from standoff.core.homography import FloatArray
 
 
 def _points_m(batches: Iterable[Batch]) -> FloatArray:

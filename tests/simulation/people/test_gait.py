@@ -5,15 +5,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from laws import seeds
+from tolerances import GEOMETRY_REL
+
+from standoff.core.homography import FloatArray
 from standoff_sim.people.anthropometry import Body
 from standoff_sim.people.clothing import sole
 from standoff_sim.people.gait import amplitude, arm_swing_deg, footing, step_length_m
 from standoff_sim.people.skeleton import Stance, hanging_wrists, reach, stand
 from standoff_sim.people.worker import Worker, make_worker
 from standoff_sim.scene.scene import Batch
-from tolerances import GEOMETRY_REL
-
-from standoff.core.homography import FloatArray
 
 ALLOWED_SLIP = 0.1
 """Of the step, as the site's interface promises."""

@@ -4,6 +4,7 @@ from collections import Counter
 
 import numpy as np
 import pytest
+
 from standoff_sim.people.outfit import HARD_HAT_COLOURS, HAT_SHARES, HI_VIS_SHARE, Outfit, choose_outfit
 from standoff_sim.solids.mesh import Colour
 

@@ -8,14 +8,14 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 from laws import examples, seeds
-from standoff_sim.people.carried import LOADS
-from standoff_sim.people.outfit import choose_outfit
-from standoff_sim.people.worker import JOINTS, Worker, make_worker
-from standoff_sim.scene.scene import CARRIED, NOTHING, Batch
 from tolerances import FOOT_ON_GROUND_M
 
 from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.homography import FloatArray
+from standoff_sim.people.carried import LOADS
+from standoff_sim.people.outfit import choose_outfit
+from standoff_sim.people.worker import JOINTS, Worker, make_worker
+from standoff_sim.scene.scene import CARRIED, NOTHING, Batch
 
 UPRIGHT: Mapping[str, float] = {}
 

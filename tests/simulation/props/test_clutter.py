@@ -3,14 +3,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapely
+
+from standoff.core.homography import FloatArray
 from standoff_sim.props.clutter import CLUTTER
 from standoff_sim.props.heaps import scatter_litter
 from standoff_sim.props.materials import SOILS, bar, block, mound, open_ended, relief, stone, tubular
 from standoff_sim.props.prop import Prop
 from standoff_sim.scene.scene import Batch
 from standoff_sim.solids.mesh import Surface
-
-from standoff.core.homography import FloatArray
 
 SEEDS = range(4)
 NAMES = [prop.name for prop in CLUTTER]

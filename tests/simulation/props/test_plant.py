@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapely
+
+from standoff.core.homography import FloatArray
 from standoff_sim.props.fences import FENCE_KINDS, make_fence
 from standoff_sim.props.plant import PLANT
 from standoff_sim.props.prop import Prop
@@ -12,8 +14,6 @@ from standoff_sim.scene.scene import Batch, moved
 from standoff_sim.solids.bars import bars, corrugated, grid, lattice
 from standoff_sim.solids.heap import heap
 from standoff_sim.solids.mesh import Mesh, Surface, rotation, srgb, translation
-
-from standoff.core.homography import FloatArray
 
 _SEEDS = range(4)
 _TRIANGLES = 16000

@@ -11,8 +11,6 @@ from drawn_ground import frame
 from drawn_solid import motion_between
 from sloping_site import SlopingSite, places_m, sloping_site
 from stages.ground.test_surveyed import STILL, blank_frame, refusal, updated
-from standoff_sim.ground.relief import make_relief
-from standoff_sim.ground.terrain_plan import TerrainPlan
 from tolerances import GROUND_THROUGH_LENS_M, OFF_PLANE_M, RELIEF_COVERAGE
 
 from standoff.core.camera import Camera, CameraPrior
@@ -39,6 +37,8 @@ from standoff.stages.ground.plane_frame import laid_marker, laid_reference, map_
 from standoff.stages.ground.surveyed import SurveyedGround
 from standoff.stages.locate import LocateParams
 from standoff.stages.locate.uncertainty import relief_covariance
+from standoff_sim.ground.relief import make_relief
+from standoff_sim.ground.terrain_plan import TerrainPlan
 
 SEEDS = [1, 2, 3]
 SIZE_PX = (1280, 720)

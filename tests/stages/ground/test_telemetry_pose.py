@@ -5,9 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from standoff_sim.camera.flight import drone_camera, make_flight
-from standoff_sim.camera.telemetry import write_telemetry
-from standoff_sim.clip.presets import FlightStyle
 from tolerances import NUMERICAL_DERIVATIVE_REL
 
 from standoff.core.camera import Camera
@@ -16,6 +13,9 @@ from standoff.core.telemetry import Telemetry
 from standoff.core.types import NoGroundMap
 from standoff.stages.frames.flight_log import FlightLog, read_flight_log
 from standoff.stages.ground import TelemetryPose, view_from_telemetry
+from standoff_sim.camera.flight import drone_camera, make_flight
+from standoff_sim.camera.telemetry import write_telemetry
+from standoff_sim.clip.presets import FlightStyle
 
 CAMERA = drone_camera(1280, 720, 70.0, np.random.default_rng(0))
 

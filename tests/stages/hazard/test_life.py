@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import pytest
+
 from standoff.stages.hazard.life import Latch
 
 
@@ -34,3 +36,19 @@ def test_a_missing_measurement_is_no_step_towards_safety_and_none_back_from_dang
     assert states(Latch(0.5, 0.5), "E??E") == "0001"
     assert states(Latch(0.5, 0.5), "EEEL??LLL") == "001111110"
     assert states(Latch(0.5, 0.5), "???") == "000"
+
+
+@pytest.mark.parametrize("fps", [5.0, 10.0, 25.0, 30.0])
+@pytest.mark.parametrize("start_s", [0.0, 0.4, 3600.2, 86_399.6])
+def test_a_latch_turns_at_the_same_frame_whenever_it_begins(fps: float, start_s: float) -> None:
+    """Frame times are rounded: a fifth of a second is more or less than 0.2 s, by what comes before."""
+    frames = round(0.4 * fps)
+    for first in range(50):
+        latch = Latch(frames / fps, frames / fps)
+        states = []
+        for k in range(first, first + 2 * frames + 1):
+            latch.update(start_s + k / fps, enters=k <= first + frames, leaves=k > first + frames)
+            states.append(latch.on)
+        assert states == [False] * frames + [True] * (frames + 1)
+        latch.update(start_s + (first + 2 * frames + 1) / fps, enters=False, leaves=True)
+        assert not latch.on

@@ -390,3 +390,12 @@ def test_noise_in_the_last_frame_is_not_said_at_the_end() -> None:
     for k in range(10):
         monitor.update(STEP_S * k, *frame({(1, 2): 9.0 if k < 9 else -2.0}), GROUND, FOLLOWED)
     assert monitor.close(STEP_S * 10) == ()
+
+
+def test_one_bad_frame_of_five_a_second_is_no_alarm_whenever_it_comes() -> None:
+    """Frame times are rounded: a step of a fifth of a second is no rare look."""
+    for first in range(40):
+        monitor = HazardMonitor(HazardParams(rule="distance", min_duration_s=0.2))
+        for k in range(first, first + 6):
+            positions, pairs = frame({(1, 2): -1.0 if k == first + 3 else 9.0})
+            assert monitor.update(k / 5.0, positions, pairs, GROUND, FOLLOWED) == ()

@@ -169,9 +169,10 @@ def test_what_is_not_measured_is_not_predicted() -> None:
     assert all(np.isnan(column).all() for column in found)
 
 
-def test_a_machine_that_stands_will_less_likely_be_elsewhere_soon() -> None:
+@pytest.mark.parametrize("standing_s", [(0.0, 10.0), (10.0, 0.0)])
+def test_who_stands_will_less_likely_be_elsewhere_soon(standing_s: tuple[float, float]) -> None:
     moves = pair((9.5, 0.0))
-    stands = replace(moves, standing_s=np.array([0.0, 10.0]))
-    assert predicted(stands, 7.8).breach_ahead[0] < 0.7 * predicted(moves, 7.8).breach_ahead[0]
-    worker_stands = replace(moves, standing_s=np.array([10.0, 0.0]))
-    assert predicted(worker_stands, 7.8).breach_ahead[0] == predicted(moves, 7.8).breach_ahead[0]
+    stands = replace(moves, standing_s=np.array(standing_s))
+    assert predicted(stands, 7.8).breach_ahead[0] < predicted(moves, 7.8).breach_ahead[0]
+    both_stand = replace(moves, standing_s=np.array([10.0, 10.0]))
+    assert predicted(both_stand, 7.8).breach_ahead[0] < 0.7 * predicted(moves, 7.8).breach_ahead[0]

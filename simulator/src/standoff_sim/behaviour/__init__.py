@@ -9,12 +9,15 @@ from standoff_sim.behaviour.digging import digging, grading, truck_loading
 from standoff_sim.behaviour.earthmoving import (
     dozing,
     driving_through,
+    heaping,
     idle,
     loader_loading,
     rolling,
     spreading,
 )
 from standoff_sim.behaviour.encounters import crossing_behind, keep_distance, near_miss
+from standoff_sim.behaviour.errands import driving_off, errand, riding, staying
+from standoff_sim.behaviour.hauling import hauling
 from standoff_sim.behaviour.people import (
     carrying_between,
     pair_talking,
@@ -29,17 +32,23 @@ __all__ = [
     "crossing_behind",
     "digging",
     "dozing",
+    "driving_off",
     "driving_through",
+    "errand",
     "grading",
+    "hauling",
+    "heaping",
     "idle",
     "keep_distance",
     "loader_loading",
     "near_miss",
     "pair_talking",
     "random_stance",
+    "riding",
     "rolling",
     "spreading",
     "standing_working",
+    "staying",
     "stooping",
     "truck_loading",
     "walking_past",

@@ -18,8 +18,10 @@ RATES_PS = MappingProxyType({"swing_deg": 55.0, "boom_deg": 30.0, "arm_deg": 45.
 
 _CYCLE_S = (15.0, 20.0)  # of loading trucks at 90 deg swing, as production handbooks have it
 _BUCKETS_A_TRUCK = (5, 8)
-_OVER_BED_M = 1.3  # of the open bucket's edge, which dips a little as it opens
-_BED_M = -1.2  # middle of a truck's bed, ahead of its middle
+OVER_BED_M = 1.3
+"""Of the open bucket's edge, which dips a little as it opens."""
+BED_M = -1.2
+"""Middle of a truck's bed, ahead of its middle."""
 
 Cycle = Callable[[], list[Stance]]
 
@@ -40,13 +42,13 @@ def truck_loading(
     Returns:
         Motions of excavator and truck.
     """
-    bed_m = truck_place.moved(_BED_M).xy_m
+    bed_m = truck_place.moved(BED_M).xy_m
     reach_m = float(np.hypot(*(bed_m - place.xy_m)))
-    swing_deg = _near_zero(excavator, float(np.rad2deg(place.bearing_to(bed_m))))
+    swing_deg = near_zero(excavator, float(np.rad2deg(place.bearing_to(bed_m))))
     arm = ExcavatorArm(excavator)
     motion, emptied_s = _cycles(
         rng, excavator, place, duration_s,
-        lambda: _dig(rng, arm, 0.0) + _empty(rng, arm, swing_deg, reach_m, truck.height_m + _OVER_BED_M),
+        lambda: dig(rng, arm, 0.0) + empty_over(rng, arm, swing_deg, reach_m, truck.height_m + OVER_BED_M),
     )  # fmt: skip
     return motion, _filling(rng, truck, truck_place, duration_s, emptied_s)
 
@@ -56,36 +58,38 @@ def digging(rng: np.random.Generator, excavator: Model, place: Place, duration_s
     arm = ExcavatorArm(excavator)
     side_deg = float(rng.choice([-1.0, 1.0]) * rng.uniform(60.0, 110.0))
     reach_m = arm.ground_reach_m * rng.uniform(0.7, 0.85)
-    cycle = lambda: _dig(rng, arm, 0.0) + _empty(rng, arm, side_deg, reach_m, 1.4)  # noqa: E731
+    cycle = lambda: dig(rng, arm, 0.0) + empty_over(rng, arm, side_deg, reach_m, 1.4)  # noqa: E731
     return _cycles(rng, excavator, place, duration_s, cycle)[0]
 
 
 def grading(rng: np.random.Generator, excavator: Model, place: Place, duration_s: float) -> Motion:
     """Level the ground: pull the bucket in along it, lift, reach out again a little to the side."""
     arm = ExcavatorArm(excavator)
-
-    def strip() -> list[Stance]:
-        swing = {"swing_deg": rng.uniform(-35.0, 35.0)}
-        far_m, near_m = arm.ground_reach_m * rng.uniform(0.85, 0.95), arm.ground_reach_m * rng.uniform(0.45, 0.55)
-        middle_m = 0.5 * (far_m + near_m)
-        return [
-            Stance({**arm.at(far_m, 0.5, 0.5), **swing, "load": 0.0}, 2.2),
-            Stance(arm.at(far_m, 0.0, 0.5), 0.8),
-            Stance({**arm.at(middle_m, 0.0, 0.5), "load": 0.25}, 1.6),
-            Stance(arm.at(near_m, 0.0, 0.5), 1.6),
-            Stance(arm.at(near_m, 0.8, 0.5), 0.8),
-        ]
-
-    return _cycles(rng, excavator, place, duration_s, strip)[0]
+    return _cycles(rng, excavator, place, duration_s, lambda: strip(rng, arm))[0]
 
 
-def _near_zero(model: Model, swing_deg: float) -> float:
+def strip(rng: np.random.Generator, arm: ExcavatorArm) -> list[Stance]:
+    """Pull the bucket in along the ground and reach out again."""
+    swing = {"swing_deg": rng.uniform(-35.0, 35.0)}
+    far_m, near_m = arm.ground_reach_m * rng.uniform(0.85, 0.95), arm.ground_reach_m * rng.uniform(0.45, 0.55)
+    middle_m = 0.5 * (far_m + near_m)
+    return [
+        Stance({**arm.at(far_m, 0.5, 0.5), **swing, "load": 0.0}, 2.2),
+        Stance(arm.at(far_m, 0.0, 0.5), 0.8),
+        Stance({**arm.at(middle_m, 0.0, 0.5), "load": 0.25}, 1.6),
+        Stance(arm.at(near_m, 0.0, 0.5), 1.6),
+        Stance(arm.at(near_m, 0.8, 0.5), 0.8),
+    ]
+
+
+def near_zero(model: Model, swing_deg: float) -> float:
     """Return the swing to a bearing within the joint's range."""
     low, high = model.joints["swing_deg"]
     return float(np.clip(swing_deg, low, high))
 
 
-def _dig(rng: np.random.Generator, arm: ExcavatorArm, ahead_deg: float) -> list[Stance]:
+def dig(rng: np.random.Generator, arm: ExcavatorArm, ahead_deg: float) -> list[Stance]:
+    """Fill the bucket."""
     swing_deg = ahead_deg + rng.uniform(-25.0, 25.0)
     reach_m, depth_m = arm.ground_reach_m * rng.uniform(0.8, 0.95), rng.uniform(0.1, 0.5)
     return [
@@ -97,9 +101,10 @@ def _dig(rng: np.random.Generator, arm: ExcavatorArm, ahead_deg: float) -> list[
     ]
 
 
-def _empty(
+def empty_over(
     rng: np.random.Generator, arm: ExcavatorArm, swing_deg: float, reach_m: float, height_m: float
 ) -> list[Stance]:
+    """Swing to one side and empty the bucket there."""
     swing = {"swing_deg": swing_deg + rng.normal(0.0, 3.0)}
     opened: Joints = arm.at(reach_m + rng.uniform(-0.5, 0.5), height_m + rng.uniform(0.0, 0.4), 0.9)
     return [
@@ -123,10 +128,11 @@ def _cycles(
     start_s = -rng.uniform(0.0, _CYCLE_S[0])
     tracks, _ = stance_keys(stances, RATES_PS, start_s)
     motion = with_joints(held(place, duration_s + STEP_S), tracks)
-    return fitted(motion, excavator), _emptied_s(tracks)
+    return fitted(motion, excavator), emptying_s(tracks)
 
 
-def _emptied_s(tracks: Mapping[str, list[Key]]) -> list[float]:
+def emptying_s(tracks: Mapping[str, list[Key]]) -> list[float]:
+    """Return when a full bucket was empty again."""
     keys = tracks["load"]
     return [now[0] for before, now in pairwise(keys) if before[1] > 0.9 and now[1] < 0.1]
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from standoff_sim.behaviour.digging import BED_M
 from standoff_sim.behaviour.stances import LoaderArms, random_stance
 from standoff_sim.movement.driving import drive
 from standoff_sim.movement.motion import (
@@ -29,7 +30,6 @@ _LIFT_DPS, _BUCKET_DPS, _BED_DPS, _BLADE_MPS = 36.0, 95.0, 9.0, 0.5
 
 _BACK_OFFS_M = (4.0, 5.5, 7.0, 9.0, 11.0, 14.0)  # of a loader from pile and truck, more than half its length
 _BUCKETS_A_TRUCK = 4
-_BED_M = -1.2  # middle of a truck's bed, ahead of its middle
 
 Round = Callable[[Place], Motion]
 
@@ -50,24 +50,7 @@ def loader_loading(
     Returns:
         Motions of loader and truck.
     """
-    arms = LoaderArms.of(loader)
-    dump = _dump_place(loader, truck, pile, truck_place)
-    apex = _apex(loader, pile, dump)
-
-    def turn_round(_: Place) -> Motion:
-        speed_mps = rng.uniform(2.2, 3.2)
-        to_pile = drive(loader, apex, pile, speed_mps=speed_mps)
-        from_pile = drive(loader, pile, apex, reverse=True, speed_mps=speed_mps)
-        to_truck = drive(loader, apex, dump, speed_mps=speed_mps * 0.8)
-        from_truck = drive(loader, dump, apex, reverse=True, speed_mps=speed_mps)
-        dig_s, dump_s = rng.uniform(3.5, 5.0), rng.uniform(2.5, 3.5)
-        whole = chained([to_pile, held(pile, dig_s), from_pile, to_truck, held(dump, dump_s), from_truck])
-        ends_s = np.cumsum(
-            [m.time_s[-1] for m in (to_pile, held(pile, dig_s), from_pile, to_truck, held(dump, dump_s))]
-        )
-        return with_joints(whole, _loading_keys(arms, ends_s.tolist(), float(whole.time_s[-1])))
-
-    motion = _repeated(rng, held(apex), turn_round, duration_s)
+    motion = _between(rng, loader, pile, _dump_place(loader, truck, pile, truck_place), duration_s)
     load = motion.joints["load"]
     emptied_s = motion.time_s[np.flatnonzero((load[:-1] > 0.5) & (load[1:] <= 0.5))].tolist()
     levels = np.linspace(rng.integers(0, 2) / _BUCKETS_A_TRUCK, 1.0, _BUCKETS_A_TRUCK + 1)
@@ -79,11 +62,44 @@ def loader_loading(
     return fitted(motion, loader), fitted(waiting, truck)
 
 
+def heaping(rng: np.random.Generator, loader: Model, pile: Place, heap: Place, duration_s: float) -> Motion:
+    """Carry from a pile to a heap on a V-shaped way.
+
+    Args:
+        rng: Decides on speeds and the moment to begin with.
+        loader: With a bucket.
+        pile: Loader's middle and heading with its bucket in the pile.
+        heap: The same where it empties the bucket; some 15 m from `pile`, at about a right angle to it.
+        duration_s: Of the motion.
+    """
+    return fitted(_between(rng, loader, pile, heap, duration_s), loader)
+
+
+def _between(rng: np.random.Generator, loader: Model, pile: Place, dump: Place, duration_s: float) -> Motion:
+    """Go to and fro between two places, backwards out of each."""
+    arms = LoaderArms.of(loader)
+    apex = _apex(loader, pile, dump)
+
+    def turn_round(_: Place) -> Motion:
+        speed_mps = rng.uniform(2.2, 3.2)
+        to_pile = drive(loader, apex, pile, speed_mps=speed_mps)
+        from_pile = drive(loader, pile, apex, reverse=True, speed_mps=speed_mps)
+        to_dump = drive(loader, apex, dump, speed_mps=speed_mps * 0.8)
+        from_dump = drive(loader, dump, apex, reverse=True, speed_mps=speed_mps)
+        dig_s, dump_s = rng.uniform(3.5, 5.0), rng.uniform(2.5, 3.5)
+        pieces = [to_pile, held(pile, dig_s), from_pile, to_dump, held(dump, dump_s), from_dump]
+        ends_s = np.cumsum([piece.time_s[-1] for piece in pieces[:-1]])
+        whole = chained(pieces)
+        return with_joints(whole, _loading_keys(arms, ends_s.tolist(), float(whole.time_s[-1])))
+
+    return _repeated(rng, held(apex), turn_round, duration_s)
+
+
 def _dump_place(loader: Model, truck: Model, pile: Place, truck_place: Place) -> Place:
     """Return where the loader's middle is when its bucket is over the truck, on the pile's side of it."""
     side = 1.0 if np.sin(truck_place.bearing_to(pile.xy_m)) > 0 else -1.0
     away_m = float(np.ptp(truck.footprint_m[:, 1]) / 2 + np.ptp(loader.footprint_m[:, 0]) / 2 + 0.9)
-    return truck_place.moved(_BED_M, side * away_m, -side * np.pi / 2)
+    return truck_place.moved(BED_M, side * away_m, -side * np.pi / 2)
 
 
 def _apex(loader: Model, pile: Place, dump: Place) -> Place:

@@ -27,7 +27,9 @@ from standoff_sim.scene.scene import Model, Motion
 WALKING_MPS = (0.8, 1.5)
 """Free walking is 1.2-1.5 m/s, slower over rough ground and with loads."""
 
-_TURN_DPS = 150.0
+TURN_DPS = 150.0
+"""How fast people turn on the spot."""
+
 _STOOPED_DEG = (45.0, 85.0)
 _STROLL_MPS = 0.5
 """Whoever walks this fast looks where they go."""
@@ -123,7 +125,7 @@ def _next_leg(rng: np.random.Generator, motion: Motion, goal: Place, carried: fl
     """Turn to a goal, walk there, and pick up or put down."""
     here = end_place(motion)
     way_rad = here.heading_rad + here.bearing_to(goal.xy_m)
-    turn = turned(here, way_rad, _TURN_DPS)
+    turn = turned(here, way_rad, TURN_DPS)
     there = walk([tuple(here.xy_m), tuple(goal.xy_m)], speed_mps * (0.85 if carried else 1.1))
     there = with_joints(there, {"arms": [(0.0, carried)]})
     return chained([motion, turn, there, _handling(rng, held(end_place(there)), 1.0 - carried)])

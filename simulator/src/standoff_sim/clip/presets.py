@@ -115,6 +115,10 @@ PRESETS: Mapping[str, Preset] = MappingProxyType(
             "busy", motion="orbit", altitude_m=22.0, pitch_deg=42.0, style="structure", clutter=1.4,
             covers=(CoverPlan("plate", 0.55, 0.75),),
         ),
+        "ordinary": Preset(
+            "A site as it usually is: machines on ground of their own, people elsewhere, now and then a short cut.",
+            "ordinary", altitude_m=45.0, pitch_deg=60.0, style="foundations", clutter=0.6,
+        ),
         "far": Preset(
             "From 60 m: workers are under 25 px tall.",
             "busy", altitude_m=60.0, pitch_deg=62.0, motion="pass", style="road", condition="hazy",

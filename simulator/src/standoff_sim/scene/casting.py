@@ -7,130 +7,28 @@ the middle of the picture; turns in degrees, counter-clockwise from x.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
-import shapely
 
 from standoff.core.homography import FloatArray
 from standoff_sim import behaviour
 from standoff_sim.machines.dozer import make_dozer
 from standoff_sim.machines.dump_truck import make_dump_truck
-from standoff_sim.machines.excavator import make_excavator
-from standoff_sim.machines.mesh_file import load_excavator
 from standoff_sim.machines.roller import make_roller
 from standoff_sim.machines.vehicle import make_vehicle
 from standoff_sim.machines.wheel_loader import make_wheel_loader
 from standoff_sim.movement.motion import Place, sample
-from standoff_sim.people.anthropometry import MEAN_STATURE_M
-from standoff_sim.people.worker import make_worker
-from standoff_sim.scene.scene import Actor, Model, Motion
+from standoff_sim.scene.cast import Cast, Stage, is_person
+from standoff_sim.scene.ordinary import ordinary_site
+from standoff_sim.scene.scene import Model, Motion
 
-_SWEEP_STEP_S = 0.5
-_PROPS_AWAY_M = 0.8
-_TOOL_RADIUS_M = 1.2
 _TRIES = 12
 _BUSY_WORKERS, _BUSY_MACHINES = 8, 5
 _BREACH_M, _NEAR_MISS_M = 5.6, 8.4
 """Distances of worker and wheel loader, whose circles touch at 7.8 m."""
-
-
-@dataclass(frozen=True, slots=True)
-class Stage:
-    """The ground that the camera looks at.
-
-    Attributes:
-        heading_deg: Of the camera, clockwise from north.
-        scale: 1 for a camera at 25 m; things stand further apart when seen from higher up.
-        duration_s: Of all motions.
-        excavator_mesh: Folder of parts in place of the procedural excavators, or None.
-        reference_m: (2,) where the reference object's middle is, in the stage's directions; None without one.
-        mean_stature_m: Of the workers, barefoot.
-    """
-
-    heading_deg: float
-    scale: float
-    duration_s: float
-    excavator_mesh: Path | None
-    reference_m: tuple[float, float] | None
-    mean_stature_m: float = MEAN_STATURE_M
-
-    def place(self, x_m: float, y_m: float, turn_deg: float = 0.0) -> Place:
-        """Return a place on the stage in site coordinates."""
-        right_rad = -np.deg2rad(self.heading_deg)
-        return Place(0.0, 0.0, float(right_rad)).moved(x_m, y_m, float(np.deg2rad(turn_deg)))
-
-    def excavator(self, rng: np.random.Generator) -> Model:
-        """Draw an excavator, from the mesh folder if there is one."""
-        return make_excavator(rng) if self.excavator_mesh is None else load_excavator(self.excavator_mesh, rng)
-
-    def worker(self, rng: np.random.Generator) -> Model:
-        """Draw a worker of this site's stature."""
-        return make_worker(rng, mean_stature_m=self.mean_stature_m)
-
-
-@dataclass(slots=True)
-class Cast:
-    """The actors so far, and the ground that they need.
-
-    Attributes:
-        actors: Numbered from 1.
-        machines_way: Where machines go, in the site frame.
-        peoples_way: Where people go.
-    """
-
-    actors: list[Actor] = field(default_factory=list)
-    machines_way: list[shapely.Geometry] = field(default_factory=list)
-    peoples_way: list[shapely.Geometry] = field(default_factory=list)
-
-    def add(self, models: Sequence[Model], motions: Sequence[Motion], *, force: bool = False) -> bool:
-        """Add entities that act together, if nobody else is in their way.
-
-        Args:
-            models: Who.
-            motions: What each does; they may come as close to each other as they like.
-            force: Add them in any case.
-
-        Returns:
-            Whether they were added.
-        """
-        ways = [swept(model, motion) for model, motion in zip(models, motions, strict=True)]
-        taken = shapely.union_all([*self.machines_way, *self.peoples_way])
-        if not force and shapely.union_all(ways).intersects(taken):
-            return False
-        for model, motion, way in zip(models, motions, ways, strict=True):
-            self.actors.append(Actor(len(self.actors) + 1, model, motion))
-            (self.peoples_way if is_person(model) else self.machines_way).append(way)
-        return True
-
-    @property
-    def ways(self) -> list[shapely.Polygon]:
-        """Return all ground that actors need, with room around."""
-        rooms = [way.buffer(_PROPS_AWAY_M) for way in (*self.machines_way, *self.peoples_way)]
-        return list(shapely.get_parts(rooms))
-
-
-def is_person(model: Model) -> bool:
-    """Return whether a model is a worker."""
-    return model.class_id == 0
-
-
-def swept(model: Model, motion: Motion) -> shapely.Geometry:
-    """Return all ground that an entity's footprint and tool pass over."""
-    shapes: list[shapely.Geometry] = []
-    before: shapely.Polygon | None = None
-    for time_s in np.arange(0.0, motion.time_s[-1] + _SWEEP_STEP_S, _SWEEP_STEP_S):
-        placement = sample(motion, float(time_s))
-        outline = shapely.Polygon(placement.to_site(model.footprint_m))
-        shapes.append(shapely.union(before or outline, outline).convex_hull)
-        before = outline
-        tip_m = model.tool_tip_m(placement.joints)
-        if tip_m is not None:
-            shapes.append(shapely.Point(placement.to_site(tip_m[:2])).buffer(_TOOL_RADIUS_M, quad_segs=3))
-    return shapely.union_all(shapes).buffer(0.1).simplify(0.05)
 
 
 def bend_over(rng: np.random.Generator, cast: Cast, share: float) -> None:
@@ -206,9 +104,7 @@ def crowd(rng: np.random.Generator, stage: Stage, *, workers: int, machines: int
         parked: Vehicles that stand on the site besides, at most.
     """
     cast = Cast()
-    keep = _reserve_reference(stage)
-    if keep is not None:
-        cast.machines_way.append(keep)
+    cast.reserved += stage.reserved()
     for _ in range(_TRIES * machines):
         left = machines - sum(not is_person(actor.model) for actor in cast.actors)
         if left <= 0:
@@ -222,15 +118,7 @@ def crowd(rng: np.random.Generator, stage: Stage, *, workers: int, machines: int
         if left <= 0:
             break
         cast.add(*_people_activity(rng, stage, left, cast))
-    if keep is not None:
-        cast.machines_way.remove(keep)
     return cast
-
-
-def _reserve_reference(stage: Stage) -> shapely.Polygon | None:
-    if stage.reference_m is None:
-        return None
-    return shapely.Point(stage.place(*stage.reference_m).xy_m).buffer(3.0)
 
 
 _Activity = tuple[Sequence[Model], Sequence[Motion]]
@@ -348,6 +236,7 @@ CASTS: Mapping[str, Callable[[np.random.Generator, Stage], Cast]] = MappingProxy
         "stationary-20": partial(_stationary, distance_m=20.0),
         "board": _nobody,
         "random": _any_number,
+        "ordinary": ordinary_site,
         "busy": partial(crowd, workers=_BUSY_WORKERS, machines=_BUSY_MACHINES),
     }
 )

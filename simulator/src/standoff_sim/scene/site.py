@@ -21,7 +21,8 @@ from standoff_sim.props.fences import make_fence
 from standoff_sim.props.heaps import scatter_litter
 from standoff_sim.props.plant import PLANT
 from standoff_sim.render import Look
-from standoff_sim.scene.casting import CASTS, Cast, Stage, bend_over
+from standoff_sim.scene.cast import Cast, Stage
+from standoff_sim.scene.casting import CASTS, bend_over
 from standoff_sim.scene.covers import make_cover
 from standoff_sim.scene.layout import lay_out
 from standoff_sim.scene.light import level_luminance, random_light

@@ -32,6 +32,6 @@ class AbsenceWatch(StreamHazard):
             return None
         if self._hazard is None:
             return self.begin(time_s, reason)
-        if self._hazard.reason == reason or self._hazard.silent_s(time_s) < self._params.update_every_s:
+        if self._hazard.reason == reason or not self._hazard.is_silent(time_s, self._params.update_every_s):
             return None
         return self._hazard.event("updated", time_s, reason=reason)

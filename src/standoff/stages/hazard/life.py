@@ -8,6 +8,7 @@ from typing import Literal
 
 from ulid import ULID
 
+from standoff.core.durations import has_lasted
 from standoff.core.types import Hazard, Phase, Severity
 
 LastPhase = Literal["closed", "unknown"]
@@ -74,7 +75,8 @@ class Latch:
             return
         if self._since_s is None:
             self._since_s = time_s
-        if (rare and not self.on) or time_s - self._since_s >= (self._off_after_s if self.on else self._on_after_s):
+        needed_s = self._off_after_s if self.on else self._on_after_s
+        if (rare and not self.on) or has_lasted(self._since_s, time_s, needed_s):
             self.on, self._since_s = not self.on, None
 
     def finish(self) -> None:
@@ -135,9 +137,9 @@ class OpenHazard:
             zone=self._zone,
         )
 
-    def silent_s(self, time_s: float) -> float:
-        """Return for how long nothing was said."""
-        return time_s - self._said_s
+    def is_silent(self, time_s: float, duration_s: float) -> bool:
+        """Return whether nothing was said for so long."""
+        return has_lasted(self._said_s, time_s, duration_s)
 
 
 class StreamHazard:

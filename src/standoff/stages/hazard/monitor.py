@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from standoff.core import protocols
+from standoff.core.durations import is_apart
 from standoff.core.homography import BoolArray
 from standoff.core.types import GroundMap, GroundPositions, Hazard, NoGroundMap, Proximities, WatchedGround
 from standoff.core.zones import Zone
@@ -87,7 +88,7 @@ class HazardMonitor(protocols.HazardMonitor):
             self._follow.update(time_s, unfollowed),
             self._sight.update(time_s, "" if no_map else self._unseeing(watched)),
         ]
-        rare = time_s - self._looked_s > self._params.min_duration_s
+        rare = is_apart(self._looked_s, time_s, self._params.min_duration_s)
         self._looked_s = time_s
         readings = _readings(proximities)
         reasons = dict(zip(positions.track_id.tolist(), positions.reason.tolist(), strict=True))

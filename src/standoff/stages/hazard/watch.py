@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from standoff.core.durations import has_lasted
 from standoff.core.types import Hazard, Severity
 from standoff.stages.hazard.life import UNMEASURED, LastPhase, Latch, OpenHazard, Reading
 from standoff.stages.hazard.params import HazardParams
@@ -84,7 +85,7 @@ class Watch:
         if self._hazard is None:
             return self._open(time_s, severity)
         changed = severity != self._hazard.severity or not self._hazard.measured
-        if severity == "unknown" or not (changed or self._hazard.silent_s(time_s) >= self._params.update_every_s):
+        if severity == "unknown" or not (changed or self._hazard.is_silent(time_s, self._params.update_every_s)):
             return None
         self._hazard.severity = severity
         return self._hazard.event("updated", time_s, reading)
@@ -104,7 +105,7 @@ class Watch:
         self._near.miss()
         self._breached.miss()
         patience_s = self._params.min_duration_s if self._is_stirred else self._params.unknown_after_s
-        if time_s - self._missing_since_s < patience_s:
+        if not has_lasted(self._missing_since_s, time_s, patience_s):
             return None
         if self._hazard is not None:
             return self._hazard.event("unknown", time_s, reason=reason) if self._hazard.measured else None
@@ -123,7 +124,7 @@ class Watch:
         if self._lost_since_s is None:
             self._lost_since_s = time_s
             return self._hazard.event("unknown", time_s, reason=reason)
-        if time_s - self._lost_since_s < self._params.unknown_timeout_s:
+        if not has_lasted(self._lost_since_s, time_s, self._params.unknown_timeout_s):
             return None
         return self.end(time_s, f"{reason} for {self._params.unknown_timeout_s:g} s")
 

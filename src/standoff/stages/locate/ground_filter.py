@@ -13,18 +13,23 @@ from typing import Final
 
 import numpy as np
 
+from standoff.core.durations import have_lasted
 from standoff.core.ground_motion import SPEED_MPS, transition, wandering
 from standoff.core.homography import BoolArray, FloatArray
+from standoff.core.roles import IS_EQUIPMENT
 from standoff.core.types import IntArray
 
 _GATE: Final = 18.4
 """Squared distance, in standard errors, that one in 10,000 right places exceeds: chi-square, two degrees of freedom."""
-_DOUBT_S: Final = 0.3 - 1e-6
-"""A place that goes on to be so far off is a new one, not an error; times are rounded."""
+_DOUBT_S: Final = 0.3
+"""A place that goes on to be so far off is a new one, not an error."""
 _KNOWN_SHARE: Final = 0.7
 """A velocity is told once its standard error is less than so much of what its class would have anyway."""
-_STEP_M, _MOVED_SIGMAS = 0.5, 3.0
-"""Whoever is nearer to where it was stands."""
+_STEP_M, _WOBBLE_SIGMAS, _MOST_M = 0.5, 3.0, 1.5
+"""Whoever is nearer to where it was stands: so far, or as far as its place wobbles by its stated error, but no further.
+Of whom less is known nobody can say that it stands, and it has moved once it seems to."""
+_STOOD_OVER_S: Final = 20.0
+"""Where something stands is the mean of so long at most: one that creeps has moved at last."""
 _LEAST_NOISE_M2: Final = 1e-6
 """No place is seen to better than a millimetre."""
 _ROW = np.dtype(
@@ -92,8 +97,9 @@ class GroundFilter:
             shared_m2: (M, 2, 2) of the part that all tracks share, to tell what is no error any more.
         """
         self._follow(track_id, class_id)
-        if math.isfinite(self._time_s):
-            self._predict(time_s - self._time_s)
+        step_s = time_s - self._time_s if math.isfinite(self._time_s) else 0.0
+        if step_s > 0.0:
+            self._predict(step_s)
         self._time_s = time_s
         seen: BoolArray = np.asarray(np.isfinite(xy_m).all(axis=1))
         fresh = seen & ~np.isfinite(self._rows["seen_s"])
@@ -105,11 +111,11 @@ class GroundFilter:
         since_s = self._rows["doubted_s"][doubted]
         self._rows["doubted_s"][doubted] = np.where(np.isnan(since_s), time_s, since_s)
         again = np.zeros(len(seen), dtype=np.bool_)
-        again[doubted] = time_s - self._rows["doubted_s"][doubted] >= _DOUBT_S
+        again[doubted] = have_lasted(time_s - self._rows["doubted_s"][doubted], _DOUBT_S)
         self._start(again, xy_m, noise_m2)
-        self._stand()
         taken = self._rows["seen_s"] == time_s
         self._rows["lasting_m2"][taken] = lasting_m2[taken]
+        self._stand(step_s)
         return self._filtered()
 
     def _follow(self, track_id: IntArray, class_id: IntArray) -> None:
@@ -127,7 +133,9 @@ class GroundFilter:
         rows = self._rows
         forth = transition(rows["class_id"], step_s)
         rows["mean"] = (forth @ rows["mean"][:, :, None])[:, :, 0]
-        gained = wandering(rows["class_id"], step_s, self._time_s - rows["stood_s"])
+        # Somebody who works on the spot goes a step at any time: for a filter only a machine starts slowly.
+        standing_s = np.where(IS_EQUIPMENT[rows["class_id"]], self._time_s - rows["stood_s"], 0.0)
+        gained = wandering(rows["class_id"], step_s, standing_s)
         rows["covariance"] = forth @ rows["covariance"] @ forth.transpose(0, 2, 1) + gained
 
     def _start(self, which: BoolArray, xy_m: FloatArray, noise_m2: FloatArray) -> None:
@@ -158,13 +166,17 @@ class GroundFilter:
         rows["seen_s"], rows["doubted_s"] = self._time_s, np.nan
         self._rows[which] = rows
 
-    def _stand(self) -> None:
+    def _stand(self, step_s: float) -> None:
         """Remember since when each track is where it is; one that went further than its error allows has moved."""
         rows = self._rows
-        spread_m2 = rows["covariance"][:, 0, 0] + rows["covariance"][:, 1, 1]
-        moved_m = np.linalg.norm(rows["mean"][:, :2] - rows["stood_m"], axis=1)
-        stands = moved_m <= np.maximum(_STEP_M, _MOVED_SIGMAS * np.sqrt(spread_m2))
-        rows["stood_m"][~stands] = rows["mean"][~stands, :2]
+        spread_m2 = np.trace(rows["covariance"][:, :2, :2] + rows["lasting_m2"], axis1=1, axis2=2)
+        off_m = rows["mean"][:, :2] - rows["stood_m"]
+        within_m = np.clip(_WOBBLE_SIGMAS * np.sqrt(spread_m2), _STEP_M, _MOST_M)
+        stands = np.linalg.norm(off_m, axis=1) <= within_m
+        # The first look is as far off as any other: the place of one that stands is the mean of all.
+        stood_s = np.minimum(self._time_s - rows["stood_s"], _STOOD_OVER_S)
+        share = np.divide(step_s, stood_s, out=np.ones(len(rows)), where=stood_s > step_s)
+        rows["stood_m"] = np.where(stands[:, None], rows["stood_m"] + share[:, None] * off_m, rows["mean"][:, :2])
         rows["stood_s"][~stands] = self._time_s
 
     def _filtered(self) -> Filtered:

@@ -8,6 +8,7 @@ import numpy as np
 
 from standoff.core import homography, protocols
 from standoff.core.classes import CLASSES
+from standoff.core.durations import ROUNDING_S, has_lasted
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.map_error import factor, map_jacobian
 from standoff.core.polygon import inside
@@ -24,9 +25,8 @@ NEAR_HORIZON = "too near the horizon"
 OUTSIDE_MAP = "outside the ground map"
 NOT_SEEN = "not seen any more"
 
-_TIME_ROUNDING_S = 1e-6
 _EDGE_SIGMAS = 2.0
-_WHOLE_S = 0.3 - _TIME_ROUNDING_S
+_WHOLE_S = 0.3
 """What was cut off just before is, its box being loose, cut off still."""
 _TOP_COUNTS_BELOW = 0.9
 """Level in the box below which an anchor moves with the upper edge by more than with anything else."""
@@ -103,7 +103,7 @@ class Locator(protocols.Locator):
         if not self._params.smooth:
             mean[taken, :2] = measured.xy_m[taken]
             covariance[taken, :2, :2] = (measured.point_m2 + measured.lasting_m2)[taken]
-        placed = time_s - filtered.seen_s <= self._params.predict_s + _TIME_ROUNDING_S
+        placed = time_s - filtered.seen_s <= self._params.predict_s + ROUNDING_S
         there_px, ahead = homography.apply(homography.invert(ground.image_to_ground), mean[:, :2])
         placed &= ahead
         mean[~placed], covariance[~placed] = np.nan, np.nan
@@ -135,7 +135,7 @@ class Locator(protocols.Locator):
         for row, track in enumerate(ids):
             if reason[row] == CUT_OFF:
                 since[track] = time_s
-            elif reason[row] == "" and time_s - since.get(track, -np.inf) < _WHOLE_S:
+            elif reason[row] == "" and not has_lasted(since.get(track, -np.inf), time_s, _WHOLE_S):
                 reason[row] = CUT_OFF
         self._cut_off_s = since
 

@@ -15,6 +15,7 @@ from typing import Final
 import numpy as np
 
 from standoff.core.classes import CLASS_BY_NAME
+from standoff.core.durations import have_lasted
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.roles import IS_EQUIPMENT
 from standoff.core.types import GroundPositions, IntArray, TextArray
@@ -72,16 +73,15 @@ class Excuses:
         mixed = IS_EQUIPMENT[positions.class_id[a]] != IS_EQUIPMENT[positions.class_id[b]]
         excuse[mixed & self._parked(positions, machine)] = PARKED
         excuse[mixed & self._riding(positions, a, b, machine, distance_m)] = IN_CAB
-        for row, pair in enumerate(_ids(positions, a, b)):
-            if pair in self._together:
-                excuse[row] = TOGETHER
+        if self._together:
+            excuse[[pair in self._together for pair in _ids(positions, a, b)]] = TOGETHER
         excuse[np.isnan(distance_m)] = ""
         return excuse
 
     def _parked(self, positions: GroundPositions, machine: IntArray) -> BoolArray:
         after_s = np.inf if self._params.parked_after_s is None else self._params.parked_after_s
         swings = positions.class_id[machine] == _EXCAVATOR
-        parked: BoolArray = (positions.standing_s[machine] >= after_s) & ~swings
+        parked: BoolArray = have_lasted(positions.standing_s[machine], after_s) & ~swings
         return parked
 
     def _riding(
@@ -92,14 +92,14 @@ class Excuses:
         riding = np.zeros(len(a), dtype=np.bool_)
         if not self._params.cabs:
             return riding
-        for row, pair in enumerate(_ids(positions, a, b)):
+        # Among hundreds of pairs hardly any is so near.
+        (rows,) = np.nonzero(~(distance_m > _CAB_WITHIN_M))
+        for row, pair in zip(rows.tolist(), _ids(positions, a[rows], b[rows]), strict=True):
             ride = self._rides.get(pair)
             if np.isnan(distance_m[row]):
                 # Hidden for a moment: nobody has left.
                 if ride is not None:
                     rides[pair] = ride
-                continue
-            if distance_m[row] > _CAB_WITHIN_M:
                 continue
             at_m = positions.xy_m[machine[row]]
             ride = ride or _Ride(at_m)
