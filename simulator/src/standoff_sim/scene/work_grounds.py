@@ -195,11 +195,15 @@ def _roll(site: WorkSite) -> None:
             return
 
 
+_GETTING_IN_S = 30.0
+"""Somebody walks some metres to a car, waits and gets in: in a shorter clip nobody does."""
+
+
 def _drive_off(site: WorkSite) -> None:
     """On some sites let a car stand until somebody walks up to it, gets in and drives off."""
     rng = site.rng
     leaves_s = STEP_S * round(float(rng.uniform(0.2, 0.9)) * site.stage.duration_s / STEP_S)
-    if rng.random() < 0.5:
+    if rng.random() < 0.5 or leaves_s < _GETTING_IN_S:
         return
     car, driver = make_vehicle(rng), site.stage.worker(rng)
     for _ in range(_TRIES):
