@@ -1,7 +1,7 @@
 """Pack a training for another machine, one with a GPU and perhaps without a network, into one archive.
 
-    python examples/detector/pack_training.py --config examples/detector/eyes.yaml --out eyes.tar [--wheels]
-    tar xf eyes.tar && STEPS=10 eyes/run.sh                                         # there
+    python examples/detector/pack_training.py --config examples/detector/photographs.yaml --out photographs.tar
+    tar xf photographs.tar && STEPS=10 photographs/run.sh   # there
 
 It holds the plan, its mixture with paths that hold anywhere, the data sets, the weights to start from, standoff's wheel
 and the lock of its dependencies, and `run.sh` (run_packed.sh), which installs, compares what the GPU computes with what
