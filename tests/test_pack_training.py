@@ -120,12 +120,15 @@ def test_a_shipped_detector_stays_a_name_and_weights_bring_what_they_know(
 
 def test_a_recipe_is_packed_in_place_of_the_pictures(plan: Path, wheel: Path, tmp_path: Path) -> None:
     write_mixture(plan.parent, {"path": "$DATA/sim-0", "name": "drawn"}, {"path": "${DATA}/streets", "split": "train"})
-    assert pack("--config", plan, "--out", tmp_path / "recipe.tar", "--wheel", wheel, "--recipe") == 0
+    simulator = wheel.with_name("standoff_sim-0.1.0-py3-none-any.whl")
+    simulator.write_bytes(b"wheel")
+    words = ("--wheel", wheel, "--recipe", "--simulator-wheel", simulator)
+    assert pack("--config", plan, "--out", tmp_path / "recipe.tar", *words) == 0
     there = unpack(tmp_path / "recipe.tar", tmp_path)
     sources = yaml.safe_load((there / "mixture.yaml").read_text())["sources"]
     assert [source["path"] for source in sources] == ["data/sim-0", "data/streets"]
     assert {"make_data.sh", "people.yaml", "label_people.py"} <= {path.name for path in (there / "recipe").iterdir()}
-    assert "moderngl" in (there / "requirements.txt").read_text()
+    assert f"./{simulator.name}" in (there / "requirements.txt").read_text() and (there / simulator.name).is_file()
     environment = {name: value for name, value in os.environ.items() if name != "SHARED"} | {"PYTHON": sys.executable}
     done = subprocess.run([there / "run.sh"], env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 2 and done.stderr.count("\n") == 1 and "set SHARED" in done.stderr

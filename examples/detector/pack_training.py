@@ -251,8 +251,9 @@ def pack_plan(config: Path, pack: Pack, *, is_recipe: bool) -> dict[str, Any]:
 
 def pack_software(pack: Pack, folder: Path, arguments: argparse.Namespace) -> None:
     """Add standoff's wheel, the lock, what is to be installed, and on request its wheels."""
-    wheel = arguments.wheel or _build_wheel(ROOT, folder)
-    wheels = [wheel, *([_build_wheel(ROOT / "simulator", folder)] if arguments.recipe else [])]
+    wheels = [arguments.wheel or _build_wheel(ROOT, folder)]
+    if arguments.recipe:
+        wheels.append(arguments.simulator_wheel or _build_wheel(ROOT / "simulator", folder))
     for one in wheels:
         pack.add_file(one.name, one, "standoff's wheel")
     lock = ROOT / "requirements.lock"
@@ -330,6 +331,7 @@ def _read_arguments(words: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--torch", action="store_true", help="with --wheels: torch, too, as pip finds it here")
     parser.add_argument("--python", metavar="3.N", help="with --wheels: for this Python; left out: for the one here")
     parser.add_argument("--wheel", type=Path, help="standoff's wheel, built already")
+    parser.add_argument("--simulator-wheel", type=Path, help="with --recipe: the simulator's wheel, built already")
     return parser.parse_args(words)
 
 

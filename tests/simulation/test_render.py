@@ -300,7 +300,7 @@ def test_without_a_driver_one_line_names_the_packages(monkeypatch: pytest.Monkey
     assert "\n" not in str(caught.value)
 
 
-def test_without_moderngl_one_line_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_moderngl_one_line_names_the_simulator(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "moderngl", None)
-    with pytest.raises(MissingDependency, match=r"standoff\[sim\]"):
+    with pytest.raises(MissingDependency, match=r"pip install \./simulator"):
         Renderer((320, 240))

@@ -19,7 +19,7 @@ ROUNDING_S: Final = 1e-6
 def has_lasted(since_s: float, time_s: float, duration_s: float) -> bool:
     """Tell whether a duration is over.
 
-    >>> has_lasted(0.6, 0.8, 0.2), 0.8 - 0.6 >= 0.2
+    >>> has_lasted(0.4, 0.7, 0.3), 0.7 - 0.4 >= 0.3
     (True, False)
     """
     return time_s - since_s >= duration_s - ROUNDING_S

@@ -211,4 +211,5 @@ def missing_of(part: object, contract: type) -> list[str]:
     ['close', 'write']
     """
     names = {name for base in contract.__mro__ for name in vars(base) if not name.startswith("_")}
-    return sorted(name for name in names if not hasattr(type(part), name) and name not in vars(part))
+    own = getattr(part, "__dict__", {})
+    return sorted(name for name in names if not hasattr(type(part), name) and name not in own)
