@@ -96,7 +96,7 @@ def test_the_film_can_be_rendered_again(film: Clip) -> None:
 @pytest.mark.live
 @pytest.mark.parametrize("every", [25, 12, 5])
 def test_the_films_danger_is_recognised_at_few_frames_a_second(every: int, tmp_path: Path) -> None:
-    settings = load_settings(FILM / "reference.yaml", {"every": every, "outputs": ()})
+    settings = load_settings(FILM / "reference.yaml", {"source": {"every": every}, "outputs": ()})
     events = [event for result in open_run(FILM / "video.mp4", tmp_path / "out", settings) for event in result.hazards]
     assert "danger" in {event.severity for event in events}
     assert len({event.hazard_id for event in events if event.rule == "proximity"}) == 2

@@ -34,6 +34,7 @@ _TRIES = 40
 _ERRAND_TRIES = 8
 _WAITS_S = 3.0
 _GANGS, _PLACES, _WALKERS = 2, 6, 3
+_ELBOW_ROOM_M, _TURN = 0.8, 2.4
 
 
 def ordinary_site(rng: np.random.Generator, stage: Stage) -> Cast:
@@ -51,8 +52,8 @@ def ordinary_site(rng: np.random.Generator, stage: Stage) -> Cast:
     places_m = [*gangs_m, *(_free(site, paths, 1.0) for _ in range(_PLACES))]
     people = [one for place_m in gangs_m for one in _gang(site, place_m)]
     people += _unloader(site)
-    people += [_walker(_Day.begun(site, paths, places_m)) for _ in range(_WALKERS)]
-    people.append(_labourer(_Day.begun(site, paths, places_m), site.machines[0]))
+    people += [_walker(_Day.begun(site, paths, _beside_others(places_m, number))) for number in range(_WALKERS)]
+    people.append(_labourer(_Day.begun(site, paths, _beside_others(places_m, _WALKERS)), site.machines[0]))
     cast = Cast()
     at_work = [(one.model, one.motion) for one in site.machines]
     for model, motion in [*at_work, *site.parked, *people, *site.riders]:
@@ -177,6 +178,12 @@ def _beside(site: WorkSite, machine: WorkGround, count: int) -> list[FloatArray]
     spots_m = machine.motion.xy_m[0] + away_m[:, None] * np.column_stack([np.cos(turns_rad), np.sin(turns_rad)])
     taken = shapely.union_all([*(one.ground.buffer(0.8) for one in site.machines), *site.bodies])
     return list(spots_m[~shapely.intersects(taken, shapely.points(spots_m))])
+
+
+def _beside_others(places_m: list[FloatArray], number: int) -> list[FloatArray]:
+    """Return where the person of this number stands at each place: nobody where another one may stand."""
+    angle = _TURN * number
+    return [place_m + _ELBOW_ROOM_M * np.array([np.cos(angle), np.sin(angle)]) for place_m in places_m]
 
 
 def _free(site: WorkSite, paths: Footpaths, room_m: float) -> FloatArray:
