@@ -105,9 +105,13 @@ def test_a_sink_that_stays_away_says_so_and_holds_nobody_up() -> None:
     until(lambda: queue.state.failures > 0)
     assert queue.state.error == "broker is away"
     begun_s = monotonic()
-    with pytest.raises(TimeoutError, match="events not delivered: broker is away"):
+    with pytest.raises(TimeoutError, match=f"{len(RESULTS[0].hazards)} events not delivered: broker is away"):
         queue.close(Outcome("complete"))
     assert monotonic() - begun_s < 2.0
+    attempts = receiver.attempts
+    assert attempts < 20  # it rests between them
+    sleep(0.5)
+    assert receiver.attempts <= attempts + 1  # and nobody tries for ever
 
 
 def test_the_news_that_nothing_arrives_comes_in_its_turn() -> None:

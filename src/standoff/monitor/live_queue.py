@@ -55,7 +55,8 @@ class LiveQueue:
         self._sink, self._size, self._patience_s = sink, size, patience_s
         self._waiting: deque[News] = deque()
         self._changed = threading.Condition()
-        self._ended = False
+        self._ended = self._given_up = False
+        self._taken: News | None = None
         self._superseded = self._failures = 0
         self._error = ""
         self._thread = threading.Thread(target=self._work, name=f"sink {type(sink).__name__}", daemon=True)
@@ -85,9 +86,12 @@ class LiveQueue:
             self._ended = True
             self._changed.notify_all()
         self._thread.join(self._patience_s)
-        with self._changed:
-            left = [event for news in self._waiting for event in news.hazards]
         if self._thread.is_alive():
+            with self._changed:
+                self._given_up = True
+                self._changed.notify_all()
+                undelivered = (*self._waiting, *([self._taken] if self._taken else ()))
+            left = [event for news in undelivered for event in news.hazards]
             raise TimeoutError(f"{len(left)} events not delivered: {self._error or 'the output does not answer'}")
         self._sink.close(outcome)
 
@@ -110,17 +114,25 @@ class LiveQueue:
                     self._sink.tell(news)
             except Exception as error:  # noqa: BLE001 - a broker that is away must not end the warnings
                 self._fail(error, news)
-                with self._changed:
-                    self._changed.wait_for(lambda: self._ended, pause_s)
-                pause_s = min(2.0 * pause_s, _LONGEST_PAUSE_S) if not self._ended else _FIRST_PAUSE_S
+                pause_s = self._rest(pause_s)
             else:
-                pause_s, self._failures, self._error = _FIRST_PAUSE_S, 0, ""
+                pause_s = _FIRST_PAUSE_S
+                with self._changed:
+                    self._taken, self._failures, self._error = None, 0, ""
 
     def _next(self) -> News | None:
         """Wait for news and take them; None at the end."""
         with self._changed:
             self._changed.wait_for(lambda: self._waiting or self._ended)
-            return self._waiting.popleft() if self._waiting else None
+            self._taken = self._waiting.popleft() if self._waiting and not self._given_up else None
+            return self._taken
+
+    def _rest(self, pause_s: float) -> float:
+        """Wait before the next attempt, and return how long to wait before the one after; the end is worth a try."""
+        with self._changed:
+            was_ended = self._ended
+            self._changed.wait_for(lambda: self._given_up or self._ended != was_ended, pause_s)
+            return _FIRST_PAUSE_S if self._ended else min(2.0 * pause_s, _LONGEST_PAUSE_S)
 
     def _fail(self, error: Exception, news: News) -> None:
         """Put what failed back, or only its events where something newer waits and there is no room."""
@@ -128,7 +140,7 @@ class LiveQueue:
             if not self._failures:
                 _LOG.warning("output %s does not take its news: %s", self._thread.name, error)
             self._failures += 1
-            self._error = str(error) or type(error).__name__
+            self._error, self._taken = str(error) or type(error).__name__, None
             if len(self._waiting) < self._size:
                 self._waiting.appendleft(news)
             else:
