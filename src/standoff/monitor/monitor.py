@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from threading import Lock
 from time import perf_counter
-from typing import Any
 
 import numpy as np
 
@@ -27,12 +26,12 @@ from standoff.core.types import (
     Detections,
     Frame,
     FrameResult,
-    GroundPositions,
     Hazard,
     NoGroundMap,
     OpenHazards,
     Proximities,
     Silence,
+    Tracks,
     WatchedGround,
 )
 from standoff.core.unfollowed import SURE_SCORE, unfollowed
@@ -108,9 +107,9 @@ class Monitor:
         for stage in self.stages.values():
             stage.prepare(size_px)
 
-    def looks_at(self, number: int, frame: Frame) -> bool:
-        """Return whether the detector runs on the `number`-th frame of the stream, from 0, wherever anybody is."""
-        return number % self.detect_every == 0 and not self.detector.rests(frame)
+    def looks_at(self, number: int, frame: Frame, *, near: bool = False) -> bool:
+        """Return whether the detector runs on the `number`-th frame of the stream, from 0; `near`: somebody is."""
+        return (near or number % self.detect_every == 0) and not self.detector.rests(frame)
 
     def look(self, frame: Frame) -> Seen:
         """Let the detector look at a frame: before `step`, perhaps in another thread."""
@@ -126,7 +125,7 @@ class Monitor:
             frame: In the order of time.
             seen: What `look` found in it, where somebody looked already.
         """
-        if seen is None and (self.looks_at(self.counts.rows["frames"], frame) or self._is_near_and_seen(frame)):
+        if seen is None and self.looks_at(self.counts.rows["frames"], frame, near=self._is_near):
             seen = self.look(frame)
         detected = seen is not None
         detections = Detections.empty() if seen is None else seen.detections
@@ -178,11 +177,11 @@ class Monitor:
             reason: Why nothing arrives.
             stream_id: For a stream of which no frame came yet.
         """
-        last = self._last
-        positions = GroundPositions.empty() if last is None else _unplaced(last.positions, reason)
-        pairs = Proximities.empty() if last is None else _unmeasured(last.proximities)
-        nothing_lost = np.zeros(0, dtype=np.bool_)
-        hazards = self.hazard.update(time_s, positions, pairs, NoGroundMap(reason), nothing_lost, WatchedGround())
+        last, ground = self._last, NoGroundMap(reason)
+        # To whoever locates and measures it is a moment without a map, in which everybody was there still.
+        positions = self.locator.update(time_s, Tracks.empty() if last is None else last.tracks, ground)
+        pairs = self.proximity.update(time_s, positions, ground)
+        hazards = self.hazard.update(time_s, positions, pairs, ground, np.zeros(0, dtype=np.bool_), WatchedGround())
         self._note(hazards)
         return Silence(stream_id if last is None else last.frame.stream_id, time_s, reason, hazards, self.open_hazards)
 
@@ -196,13 +195,6 @@ class Monitor:
         hazards = self.hazard.lose(time_s, lost) if lost else self.hazard.close(time_s)
         self._note(hazards)
         return hazards
-
-    def describe(self) -> dict[str, Any]:
-        """Return what the stages say of themselves so far, for the record."""
-        return {name: stage.description for name, stage in self.stages.items()}
-
-    def _is_near_and_seen(self, frame: Frame) -> bool:
-        return self._is_near and not self.detector.rests(frame)
 
     def _note(self, hazards: tuple[Hazard, ...]) -> None:
         self.open_hazards = self.open_hazards.after(hazards)
@@ -223,29 +215,3 @@ def clocked(stage_ms: dict[str, float], stage: str) -> Iterator[None]:
     start_s = perf_counter()
     yield
     stage_ms[stage] = (perf_counter() - start_s) * 1e3
-
-
-def _unplaced(positions: GroundPositions, reason: str) -> GroundPositions:
-    """Return the same entities, of none of which is known where it is."""
-    count = len(positions)
-    return replace(
-        positions,
-        xy_m=np.full((count, 2), np.nan),
-        velocity_mps=np.full((count, 2), np.nan),
-        state_covariance=np.full((count, 4, 4), np.nan),
-        map_factor_m=np.full((count, 2, 10), np.nan),
-        predicted=np.ones(count, dtype=np.bool_),
-        standing_s=np.full(count, np.nan),
-        valid=np.zeros(count, dtype=np.bool_),
-        reason=np.full(count, reason, dtype=object),
-    )
-
-
-def _unmeasured(pairs: Proximities) -> Proximities:
-    """Return the same pairs, none of which is measured."""
-    nothing = np.full(len(pairs), np.nan)
-    names = ("distance_m", "gap_m", "sigma_m", "closing_mps", "time_to_contact_s", "closest_m", "closest_in_s")
-    unknown = dict.fromkeys((*names, "breach_now", "breach_ahead"), nothing)
-    return replace(
-        pairs, **unknown, filtered=np.zeros(len(pairs), dtype=np.bool_), excuse=np.full(len(pairs), "", dtype=object)
-    )
