@@ -133,9 +133,9 @@ _HEAVY = {"cv2", "torch", "onnxruntime", "numba", "matplotlib", "pyarrow", "av",
         ("standoff.files.json_text", set()),
         ("standoff.files.whole", set()),
         ("standoff.clips", {"pyarrow"}),
-        ("standoff.drawing.painter", {"cv2", "numba", "scipy"}),
+        ("standoff.drawing.painter", {"cv2"}),
         ("standoff.labels", {"cv2"}),
-        ("standoff.stages.sinks", {"cv2", "pyarrow", "av", "numba", "scipy"}),
+        ("standoff.stages.sinks", {"cv2", "pyarrow", "av"}),
     ],
 )
 def test_heavy_libraries_wait_until_something_needs_them(light: str, allowed: set[str]) -> None:

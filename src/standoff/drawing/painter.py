@@ -9,14 +9,12 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from standoff.core.compiled import compiled
 from standoff.core.homography import FloatArray
 from standoff.core.types import ImageArray
+from standoff.drawing.fixed_point import FAR_PX, SHIFT
 from standoff.drawing.palette import Bgr, bgr
 from standoff.drawing.text import TextSprites, write_light
 
-_SHIFT = 4
-_FAR_PX = 1e6
 _MOST_DASHES = 600
 
 Rectangle = tuple[int, int, int, int]
@@ -51,7 +49,10 @@ class Painter:
         if dashed:
             self._strokes(_dashes(points_px, self.stroke_px), (colour, self.stroke_px))
         elif np.isfinite(points_px).all():
-            cv2.fillPoly(self._canvas, [_strip(points_px, self.stroke_px)], colour, cv2.LINE_AA, _SHIFT)
+            # Whoever draws no curve does not wait for the compiler to be loaded.
+            from standoff.drawing.strokes import strip
+
+            cv2.fillPoly(self._canvas, [strip(points_px, self.stroke_px)], colour, cv2.LINE_AA, SHIFT)
 
     def cased_line(self, points_px: FloatArray, colour: Bgr, *, dashed: bool = False) -> None:
         """Draw a polyline with a dark edge, to be seen on any ground."""
@@ -64,11 +65,11 @@ class Painter:
             return
         strokes = list(_fixed_point(strokes_px))
         for colour, width_px in pens:
-            cv2.polylines(self._canvas, strokes, False, colour, width_px, cv2.LINE_AA, _SHIFT)
+            cv2.polylines(self._canvas, strokes, False, colour, width_px, cv2.LINE_AA, SHIFT)
 
     def box(self, xyxy_px: Sequence[float], colour: Bgr, *, dashed: bool = False) -> None:
         """Draw a rectangle."""
-        x1, y1, x2, y2 = (min(max(edge_px, -_FAR_PX), _FAR_PX) for edge_px in xyxy_px)
+        x1, y1, x2, y2 = (min(max(edge_px, -FAR_PX), FAR_PX) for edge_px in xyxy_px)
         if dashed:
             self.line(np.array([[x1, y1], [x2, y1], [x2, y2], [x1, y2], [x1, y1]]), colour, dashed=True)
             return
@@ -81,11 +82,11 @@ class Painter:
         x, y = point_px
         if not (math.isfinite(x) and math.isfinite(y)):
             return
-        centre = tuple(round(min(max(one_px, -_FAR_PX), _FAR_PX) * (1 << _SHIFT)) for one_px in (x, y))
-        radius = (2 + self.stroke_px) << _SHIFT
-        cv2.circle(self._canvas, centre, radius + (1 << _SHIFT), bgr("dark"), -1, cv2.LINE_AA, _SHIFT)
+        centre = tuple(round(min(max(one_px, -FAR_PX), FAR_PX) * (1 << SHIFT)) for one_px in (x, y))
+        radius = (2 + self.stroke_px) << SHIFT
+        cv2.circle(self._canvas, centre, radius + (1 << SHIFT), bgr("dark"), -1, cv2.LINE_AA, SHIFT)
         thickness = self.stroke_px if hollow else -1
-        cv2.circle(self._canvas, centre, radius, colour, thickness, cv2.LINE_AA, _SHIFT)
+        cv2.circle(self._canvas, centre, radius, colour, thickness, cv2.LINE_AA, SHIFT)
 
     def fill(self, outline_px: FloatArray, colour: Bgr, opacity: float, holes_px: Sequence[FloatArray] = ()) -> None:
         """Tint the inside of an outline, without what is inside the outlines of holes."""
@@ -93,15 +94,15 @@ class Painter:
             return
         height, width = self._canvas.shape[:2]
         outlines = [_fixed_point(one) for one in (outline_px, *holes_px)]
-        left, top, wide, high = cv2.boundingRect(outlines[0] >> _SHIFT)
+        left, top, wide, high = cv2.boundingRect(outlines[0] >> SHIFT)
         x0, y0 = max(left, 0), max(top, 0)
         x1, y1 = min(left + wide, width), min(top + high, height)
         if x0 >= x1 or y0 >= y1:
             return
         area = self._canvas[y0:y1, x0:x1]
         tinted = area.copy()
-        corner = np.array([x0, y0], dtype=np.int32) * (1 << _SHIFT)
-        cv2.fillPoly(tinted, [outline - corner for outline in outlines], colour, cv2.LINE_8, _SHIFT)
+        corner = np.array([x0, y0], dtype=np.int32) * (1 << SHIFT)
+        cv2.fillPoly(tinted, [outline - corner for outline in outlines], colour, cv2.LINE_8, SHIFT)
         cv2.addWeighted(tinted, opacity, area, 1.0 - opacity, 0.0, dst=area)
 
     def label_size_px(self, text: str, *, bold: bool = False) -> tuple[int, int]:
@@ -169,26 +170,6 @@ class Painter:
         return None
 
 
-@compiled
-def _strip(points_px: FloatArray, width_px: float) -> npt.NDArray[np.int32]:
-    """Return the outline of the stroke of a curve (N, 2) in fixed point, (2 N, 2): up one side, back down the other.
-
-    Filled in one go, it costs half of cv2.polylines with its many joints.
-    """
-    count = len(points_px)
-    strip = np.empty((2 * count, 2), dtype=np.int32)
-    for i in range(count):
-        along_x = points_px[min(i + 1, count - 1), 0] - points_px[max(i - 1, 0), 0]
-        along_y = points_px[min(i + 1, count - 1), 1] - points_px[max(i - 1, 0), 1]
-        length = max(math.sqrt(along_x * along_x + along_y * along_y), 1e-9)
-        aside_x, aside_y = 0.5 * width_px * along_y / length, -0.5 * width_px * along_x / length
-        for place, sign in ((i, 1.0), (2 * count - 1 - i, -1.0)):
-            x, y = points_px[i, 0] + sign * aside_x, points_px[i, 1] + sign * aside_y
-            strip[place, 0] = round(min(max(x, -_FAR_PX), _FAR_PX) * (1 << _SHIFT))
-            strip[place, 1] = round(min(max(y, -_FAR_PX), _FAR_PX) * (1 << _SHIFT))
-    return strip
-
-
 def _dashes(points_px: FloatArray, stroke_px: int) -> FloatArray:
     """Cut a polyline into dashes, (K, 2, 2); one that is too long to be seen as a whole is left as it is."""
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points_px, axis=0), axis=1))])
@@ -203,6 +184,6 @@ def _dashes(points_px: FloatArray, stroke_px: int) -> FloatArray:
 
 
 def _fixed_point(points_px: FloatArray) -> npt.NDArray[np.int32]:
-    bounded = np.maximum(np.minimum(points_px, _FAR_PX), -_FAR_PX)
-    fixed: npt.NDArray[np.int32] = np.rint(bounded * (1 << _SHIFT)).astype(np.int32)
+    bounded = np.maximum(np.minimum(points_px, FAR_PX), -FAR_PX)
+    fixed: npt.NDArray[np.int32] = np.rint(bounded * (1 << SHIFT)).astype(np.int32)
     return fixed
