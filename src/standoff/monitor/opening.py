@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
@@ -60,9 +60,6 @@ def open_run(
     if isinstance(monitor.detector, RecordedDetector):
         monitor.detector.check_source(frames.description)
     extra = {name: build_replacement(name, one, Sink) for name, one in settings.extra_outputs.items()}
-    # The record first, so that a folder without room is told before anything else is begun.
-    about = {"settings": resolved(settings), **describe_run(frames, monitor)}
-    folder = RunFolder(prepare_output(out, overwrite=overwrite), about)
     wanted = Wanted(
         source=frames.description,
         detector=monitor.detector.description,
@@ -74,10 +71,23 @@ def open_run(
         warning_gap_m=settings.hazard.buffer_m,
         checked=checked,
     )
+    # The record first, so that a folder without room is told before anything else is begun.
+    about = {"settings": resolved(settings), **describe_run(frames, monitor)}
+    folder = RunFolder(prepare_output(out, overwrite=overwrite), about)
+    own = _begin_outputs(folder, settings.outputs, wanted)
+    return Run(frames, monitor, {**(more_sinks or {}), **own, **extra}, folder, overlaps=overlaps)
+
+
+def _begin_outputs(folder: RunFolder, names: Iterable[str], wanted: Wanted) -> dict[str, Sink]:
+    """Begin the outputs of these names; where one cannot be, the run has failed and says so.
+
+    Raises:
+        OutputError: There is no room.
+    """
     try:
-        if zones:
-            write_zones(folder.path / ZONES_FILE, zones)
-        own = {name: make_sink(name, folder.path, wanted) for name in settings.outputs}
+        if wanted.zones:
+            write_zones(folder.path / ZONES_FILE, wanted.zones)
+        return {name: make_sink(name, folder.path, wanted) for name in names}
     except OSError as error:
         refused = OutputError(
             expected=f"room for the outputs in {folder.path}",
@@ -87,7 +97,6 @@ def open_run(
         with suppress(OutputError):
             folder.finish(Outcome("failed", str(refused)), {})
         raise refused from error
-    return Run(frames, monitor, {**(more_sinks or {}), **own, **extra}, folder, overlaps=overlaps)
 
 
 def _refuse_to_replace(source: Path, out: Path, what: str) -> None:
