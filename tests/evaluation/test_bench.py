@@ -16,7 +16,7 @@ from standoff.core.errors import SourceError
 from standoff.core.types import FrameResult, GroundMap
 from standoff.evaluation.bench import bench_source
 from standoff.evaluation.bench_baselines import decoding_baseline, picture_baselines
-from standoff.evaluation.bench_workload import DrawingSink, ScriptedDetector, Site, SiteFilm, monitor_workload
+from standoff.evaluation.bench_workload import DrawingSink, Site, SiteFilm, monitor_workload
 from standoff.evaluation.timing import Baseline, Spread, StageTimes, collect_times, machine
 from standoff.monitor import Monitor, Run
 from standoff.stages.frames import SourceParams
@@ -26,13 +26,14 @@ from standoff.stages.motion import MotionEstimator
 from standoff.stages.proximity import ProximityMeter
 from standoff.stages.track import Tracker
 from standoff.stages.watched import GroundWatcher
+from standoff.testing import ScriptedDetector
 
 SMALL_PX = (480, 270)
 
 
 def run_of(site: Site, kind: Literal["surveyed", "reference"], frames: int = 20) -> Run:
     monitor = Monitor(
-        detector=ScriptedDetector(site),
+        detector=ScriptedDetector({index: site.detections(index) for index in range(frames)}),
         motion=MotionEstimator(),
         ground=site.ground(kind),
         tracker=Tracker(),

@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -12,11 +12,9 @@ from standoff.core.types import (
     CameraMotion,
     Detections,
     Frame,
-    FrameResult,
     GroundMap,
     NoCameraMotion,
     NoGroundMap,
-    Outcome,
 )
 from standoff.monitor import Monitor, Run
 from standoff.stages.frames import frame_from_array
@@ -27,23 +25,7 @@ from standoff.stages.motion import MotionEstimator
 from standoff.stages.proximity import ProximityMeter
 from standoff.stages.track import Tracker
 from standoff.stages.watched import GroundWatcher
-
-
-class Memory:
-    """A sink that keeps everything, and can be told to fail."""
-
-    def __init__(self, *, fail_at: int | None = None) -> None:
-        self.results: list[FrameResult] = []
-        self.outcomes: list[Outcome] = []
-        self.fail_at = fail_at
-
-    def write(self, result: FrameResult) -> None:
-        if len(self.results) == self.fail_at:
-            raise OSError("no space left on device")
-        self.results.append(result)
-
-    def close(self, outcome: Outcome) -> None:
-        self.outcomes.append(outcome)
+from standoff.testing import DrawnFilm, MemorySink
 
 
 class TwoWalkers(protocols.Detector):
@@ -69,27 +51,17 @@ class MetreGround(protocols.Ground):
         return GroundMap(matrix, np.zeros((9, 9)), frame.size_px, "test", 0.1)
 
 
-class Film(protocols.Source):
-    """Black pictures, ten a second; says of itself how many it has shown, and can break."""
-
-    size_px = (120, 100)
+class Film(DrawnFilm):
+    """Black pictures, ten a second, of which the film says that they are dark; it can break."""
 
     def __init__(self, count: int, broken_after: int | None = None) -> None:
-        self.count, self.broken_after, self.shown, self.closed = count, broken_after, 0, False
+        broken = SourceTruncated(expected="10 frames", found=str(broken_after), fix="copy the file again")
+        black = np.zeros((100, 120, 3), np.uint8)
+        super().__init__([black] * count, fails_after=broken_after, error=broken)
 
     @property
-    def description(self) -> dict[str, Any]:
-        return {"shown": self.shown, "warnings": ["dark"]}
-
-    def frames(self) -> Iterator[Frame]:
-        for index in range(self.count):
-            if index == self.broken_after:
-                raise SourceTruncated(expected="10 frames", found=str(index), fix="copy the file again")
-            self.shown += 1
-            yield frame_from_array(np.zeros((100, 120, 3), np.uint8), index=index, time_s=index / 10)
-
-    def close(self) -> None:
-        self.closed = True
+    def description(self) -> Mapping[str, Any]:
+        return {**super().description, "warnings": ["dark"]}
 
 
 def monitor(*, detect_every: int = 1, mapped: bool = True) -> Monitor:
@@ -107,7 +79,7 @@ def monitor(*, detect_every: int = 1, mapped: bool = True) -> Monitor:
 
 
 def run_of(
-    count: int, *sinks: Memory, broken_after: int | None = None, detect_every: int = 1, mapped: bool = True
+    count: int, *sinks: MemorySink, broken_after: int | None = None, detect_every: int = 1, mapped: bool = True
 ) -> Run:
     named = {f"sink{number}": sink for number, sink in enumerate(sinks)}
     return Run(Film(count, broken_after), monitor(detect_every=detect_every, mapped=mapped), named)
@@ -120,7 +92,7 @@ def test_a_pair_is_measured_in_metres_from_foot_to_foot() -> None:
 
 
 def test_every_frame_reaches_every_sink_with_the_time_of_each_stage() -> None:
-    memory = Memory()
+    memory = MemorySink()
     results = list(run_of(5, memory))
     assert (
         [result.frame.index for result in memory.results] == [result.frame.index for result in results] == [*range(5)]
@@ -183,7 +155,7 @@ def test_without_a_map_every_pair_is_there_and_none_is_measured() -> None:
 
 
 def test_a_sink_that_fails_is_left_out_and_the_others_go_on() -> None:
-    broken, healthy = Memory(fail_at=2), Memory()
+    broken, healthy = MemorySink(fails_at=2), MemorySink()
     monitored = run_of(6, broken, healthy)
     assert len(list(monitored)) == 6
     assert len(healthy.results) == 6
@@ -193,7 +165,7 @@ def test_a_sink_that_fails_is_left_out_and_the_others_go_on() -> None:
 
 
 def test_a_source_that_breaks_closes_the_sinks_as_failed_and_keeps_what_was_done() -> None:
-    memory = Memory()
+    memory = MemorySink()
     with pytest.raises(SourceTruncated):
         list(run_of(10, memory, broken_after=4))
     assert len(memory.results) == 4
@@ -202,7 +174,7 @@ def test_a_source_that_breaks_closes_the_sinks_as_failed_and_keeps_what_was_done
 
 
 def test_stopping_early_closes_the_sinks_as_interrupted() -> None:
-    memory = Memory()
+    memory = MemorySink()
     results = iter(run_of(10, memory))
     next(results)
     results.close()
@@ -210,21 +182,21 @@ def test_stopping_early_closes_the_sinks_as_interrupted() -> None:
 
 
 def test_hazards_still_open_at_the_end_are_closed_in_the_outcome() -> None:
-    memory = Memory()
+    memory = MemorySink()
     opened = {event.hazard_id for result in run_of(30, memory) for event in result.hazards}
     closed = {event.hazard_id for event in memory.outcomes[0].hazards if event.phase == "closed"}
     assert opened and closed == opened
 
 
 def test_what_the_source_says_at_the_end_is_what_the_sinks_hear() -> None:
-    memory = Memory()
+    memory = MemorySink()
     ran = run_of(7, memory)
     assert len(list(ran)) == 7
     (outcome,) = memory.outcomes
     assert outcome.about["source"]["shown"] == 7
     assert outcome.about["warnings"][0] == "dark"
     assert outcome.counts.rows["frames"] == 7
-    assert isinstance(ran.source, Film) and ran.source.closed
+    assert isinstance(ran.source, Film) and ran.source.is_closed
 
 
 def test_what_is_open_is_in_every_result() -> None:
@@ -236,7 +208,7 @@ def test_what_is_open_is_in_every_result() -> None:
 
 
 def test_hazards_of_a_stream_that_was_lost_become_unknown_and_are_not_closed() -> None:
-    memory = Memory()
+    memory = MemorySink()
     with pytest.raises(SourceTruncated):
         list(run_of(30, memory, broken_after=20))
     opened = {event.hazard_id for result in memory.results for event in result.hazards}
@@ -270,7 +242,7 @@ def test_a_camera_that_never_told_anything_is_unknown_too() -> None:
 def test_overlapping_changes_nothing_but_the_time_it_takes(detect_every: int, near_m: float | None) -> None:
     kept = []
     for overlaps in (False, True):
-        memory, watched = Memory(), monitor(detect_every=detect_every)
+        memory, watched = MemorySink(), monitor(detect_every=detect_every)
         watched.detect_near_m = near_m
         yielded = list(Run(Film(25), watched, {"memory": memory}, overlaps=overlaps))
         assert [result.frame.index for result in yielded] == [result.frame.index for result in memory.results]
@@ -288,21 +260,21 @@ def test_overlapping_changes_nothing_but_the_time_it_takes(detect_every: int, ne
 
 
 def test_what_breaks_ahead_is_told_in_its_turn() -> None:
-    memory = Memory()
+    memory = MemorySink()
     film = Film(10, broken_after=4)
     with pytest.raises(SourceTruncated):
         list(Run(film, monitor(), {"memory": memory}, overlaps=True))
     assert [result.frame.index for result in memory.results] == [0, 1, 2, 3]
-    assert (memory.outcomes[0].status, film.closed) == ("failed", True)
+    assert (memory.outcomes[0].status, film.is_closed) == ("failed", True)
 
 
 def test_a_run_that_is_stopped_while_it_looks_ahead_writes_what_it_began_and_ends() -> None:
-    memory, film = Memory(), Film(1000)
+    memory, film = MemorySink(), Film(1000)
     results = iter(Run(film, monitor(), {"memory": memory}, overlaps=True))
     for _ in range(3):
         last = next(results)
     results.close()
-    assert memory.outcomes[0].status == "interrupted" and film.closed
+    assert memory.outcomes[0].status == "interrupted" and film.is_closed
     written = [result.frame.index for result in memory.results]
     assert written == [*range(len(written))] and last.frame.index < len(written) <= last.frame.index + 2
     assert film.shown < 10

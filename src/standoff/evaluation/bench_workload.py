@@ -42,6 +42,7 @@ from standoff.stages.sinks import (
 )
 from standoff.stages.track import Tracker
 from standoff.stages.watched import GroundWatcher
+from standoff.testing import ScriptedDetector
 
 _RATE_FPS = 30.0
 _CAMERA_HEIGHT_M = 20.0
@@ -153,17 +154,6 @@ class SiteFilm(protocols.Source):
         """Do nothing: there is no file."""
 
 
-class ScriptedDetector(protocols.Detector):
-    """See what the site says is there."""
-
-    def __init__(self, site: Site) -> None:
-        self._site = site
-
-    def detect(self, frame: Frame) -> Detections:
-        """Return the boxes of this frame."""
-        return self._site.detections(frame.index)
-
-
 class DrawingSink:
     """Draw the annotated video without encoding it."""
 
@@ -203,7 +193,7 @@ def monitor_workload(
     site = Site(size_px, tracks)
     with TemporaryDirectory() as folder:
         monitor = Monitor(
-            detector=ScriptedDetector(site),
+            detector=ScriptedDetector({index: site.detections(index) for index in range(frames)}),
             motion=MotionEstimator(),
             ground=site.ground(ground),
             tracker=Tracker(),
