@@ -45,7 +45,7 @@ PUBLIC_NAMES = {
         "read_data", "to_site_classes", "write_coco", "write_label_studio",
     },
     "standoff.monitor": {
-        "FanOut", "LiveQueue", "Monitor", "QueueState", "Run", "RunFolder", "RunRecord", "build_monitor", "open_run",
+        "FanOut", "LiveQueue", "Monitor", "QueueState", "RecordKeeper", "Run", "RunRecord", "build_monitor", "open_run",
         "warnings_of",
     },
     "standoff.stages.detect": {

@@ -15,7 +15,7 @@ from cli.calling import Call
 from cli.test_cli import make_video
 
 from standoff.files.in_use import in_use
-from standoff.monitor import run_folder
+from standoff.monitor import record
 
 ROOM_FOR_THE_RECORD = 16_000
 """Bytes a file: no film or report is so short."""
@@ -139,5 +139,5 @@ def test_a_run_that_is_going_on_is_not_overwritten(call: Call, video: Path, site
 def test_what_is_written_in_the_place_of_a_longer_record_takes_its_whole_place(tmp_path: Path) -> None:
     path = tmp_path / "run.json"
     path.write_text(json.dumps({"status": "running", "long": "x" * 500}))
-    run_folder._write_over(path, {"status": "failed"})
+    record._write_over(path, {"status": "failed"})
     assert json.loads(path.read_text()) == {"status": "failed"}

@@ -11,16 +11,16 @@ from standoff.monitor.fan_out import FanOut
 from standoff.monitor.live_queue import LiveQueue, QueueState
 from standoff.monitor.monitor import Monitor
 from standoff.monitor.opening import open_run
+from standoff.monitor.record import RecordKeeper, RunRecord
 from standoff.monitor.run import Run, warnings_of
-from standoff.monitor.run_folder import RunFolder, RunRecord
 
 __all__ = [
     "FanOut",
     "LiveQueue",
     "Monitor",
     "QueueState",
+    "RecordKeeper",
     "Run",
-    "RunFolder",
     "RunRecord",
     "build_monitor",
     "open_run",

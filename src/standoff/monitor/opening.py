@@ -14,8 +14,8 @@ from standoff.core.protocols import Sink
 from standoff.core.types import Outcome
 from standoff.files.zone_file import write_zones
 from standoff.monitor.build import build_monitor
+from standoff.monitor.record import RecordKeeper
 from standoff.monitor.run import Run, describe_run
-from standoff.monitor.run_folder import RunFolder
 from standoff.stages.detect import RecordedDetector
 from standoff.stages.frames import local_path, open_source
 from standoff.stages.sinks import Wanted, make_sink, prepare_output
@@ -73,12 +73,12 @@ def open_run(
     )
     # The record first, so that a folder without room is told before anything else is begun.
     about = {"settings": resolved(settings), **describe_run(frames, monitor)}
-    folder = RunFolder(prepare_output(out, overwrite=overwrite), about)
+    folder = RecordKeeper(prepare_output(out, overwrite=overwrite), about)
     own = _begin_outputs(folder, settings.outputs, wanted)
     return Run(frames, monitor, {**(more_sinks or {}), **own, **extra}, folder, overlaps=overlaps)
 
 
-def _begin_outputs(folder: RunFolder, names: Iterable[str], wanted: Wanted) -> dict[str, Sink]:
+def _begin_outputs(folder: RecordKeeper, names: Iterable[str], wanted: Wanted) -> dict[str, Sink]:
     """Begin the outputs of these names; where one cannot be, the run has failed and says so.
 
     Raises:

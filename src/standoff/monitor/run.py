@@ -17,7 +17,7 @@ from standoff.core.types import FrameResult, Outcome
 from standoff.monitor.fan_out import FanOut
 from standoff.monitor.look_ahead import Ahead, look_ahead, one_by_one
 from standoff.monitor.monitor import Monitor
-from standoff.monitor.run_folder import RunFolder, RunRecord
+from standoff.monitor.record import RecordKeeper, RunRecord
 
 STOPPED = "stopped before the end of the source"
 
@@ -46,7 +46,7 @@ class Run:
         source: Source,
         monitor: Monitor,
         sinks: Mapping[str, Sink] | None = None,
-        folder: RunFolder | None = None,
+        folder: RecordKeeper | None = None,
         *,
         overlaps: bool = False,
     ) -> None:

@@ -75,8 +75,8 @@ class RunRecord:
         )
 
 
-class RunFolder:
-    """The folder of a run and its record, which says "running" at the start and how it ended at the end.
+class RecordKeeper:
+    """Keep the record of a run in its folder, which says "running" at the start and how it ended at the end.
 
     A record that still says "running" after its process has gone belongs to a killed run. Nobody else may write to the
     folder until `finish`.

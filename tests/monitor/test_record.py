@@ -10,7 +10,7 @@ from stages.sinks.fake_site import FakeSite, ended
 from standoff.core.errors import OutputError
 from standoff.core.types import Outcome
 from standoff.files.in_use import in_use
-from standoff.monitor import RunFolder
+from standoff.monitor import RecordKeeper
 
 NAN = float("nan")
 
@@ -22,7 +22,7 @@ def _refuse(constant: str) -> None:
 def test_the_record_says_running_until_the_end(tmp_path: Path) -> None:
     path = tmp_path / "run.json"
     about = {"configuration": {"detect": {"score": np.float64(0.4), "classes": (1, 2)}}, "x": NAN}
-    folder = RunFolder(tmp_path, about)
+    folder = RecordKeeper(tmp_path, about)
     record = json.loads(path.read_text(), parse_constant=_refuse)
     assert record["status"] == "running"
     assert record["configuration"] == {"detect": {"score": 0.4, "classes": [1, 2]}}
@@ -35,7 +35,7 @@ def test_the_record_says_running_until_the_end(tmp_path: Path) -> None:
 
 
 def test_what_the_file_says_at_the_end_is_what_the_record_says(tmp_path: Path) -> None:
-    folder = RunFolder(tmp_path, {})
+    folder = RecordKeeper(tmp_path, {})
     outcome = Outcome("failed", "model: out of memory", sink_errors={"video": "disk full"})
     stages = {"detect": {"median_ms": 20.0}}
     folder.finish(ended(FakeSite((64, 36)).results(100), outcome), stages)
@@ -48,7 +48,7 @@ def test_what_the_file_says_at_the_end_is_what_the_record_says(tmp_path: Path) -
 
 
 def test_the_folder_is_nobody_elses_until_the_end(tmp_path: Path) -> None:
-    folder = RunFolder(tmp_path, {})
+    folder = RecordKeeper(tmp_path, {})
     with pytest.raises(OutputError, match="still going on"), in_use(tmp_path):
         pass
     folder.finish(Outcome("complete"), {})
