@@ -54,3 +54,12 @@ def test_rounding_leaves_the_ends_and_straight_legs_where_they_are() -> None:
     straight_m = shapely.LineString([(0, 0), (10, 0), (10, 10)])
     assert max(straight_m.distance(shapely.Point(one)) for one in way_m) < 0.75
     assert np.linalg.norm(np.diff(way_m, axis=0), axis=1).max() <= 2.0 + 1e-9
+
+
+def test_a_way_that_would_come_back_as_it_went_goes_straight_on() -> None:
+    there_m, out_m, on_m = [0.0, 0.0], [3.0, 1.0], [-4.0, 6.0]
+    np.testing.assert_allclose(rounded(np.array([there_m, out_m, there_m, on_m])), rounded(np.array([there_m, on_m])))
+    half_way_m = [1.5, 0.5]
+    straight_m = rounded(np.array([there_m, out_m, out_m, half_way_m]))
+    np.testing.assert_allclose(straight_m[[0, -1]], [there_m, half_way_m])
+    assert np.linalg.norm(np.diff(straight_m, axis=0), axis=1).sum() == pytest.approx(np.hypot(*half_way_m))

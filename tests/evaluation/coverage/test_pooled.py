@@ -8,15 +8,18 @@ open where in them a machine stands, and the stated errors allow for more of tha
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 import tolerances
-from evaluation.coverage.noisy_runs import samples_of
 
 from standoff.evaluation.coverage import ClipSamples, PairRow, score_samples
+
+sys.path.insert(0, str(Path(__file__).parents[3] / "examples" / "pooled_errors"))
+from noisy_runs import samples_of
 
 _QUICK = (("busy", 301), ("busy", 302), ("busy", 303), ("mobile", 301))
 _MANY = [(preset, seed) for preset in ("busy", "mobile", "stationary-15") for seed in range(401, 409)]

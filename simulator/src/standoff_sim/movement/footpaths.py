@@ -14,6 +14,9 @@ _ROUND_M = 0.3
 """Corners lie so far outside of what is avoided, so that a way along them does not touch it."""
 _CORNERS_A_QUARTER = 4
 _KNOT_M = 2.0
+_APART_M = 1e-3
+_TURNS_BACK = -0.9999
+"""The cosine of a turn that no rounding of its corner makes a way of."""
 _HALVINGS = 2
 
 
@@ -86,13 +89,28 @@ def rounded(points_m: FloatArray) -> FloatArray:
     Source:
         Chaikin, An algorithm for high-speed curve generation, 1974.
     """
-    apart = np.concatenate([[True], np.linalg.norm(np.diff(points_m, axis=0), axis=1) > 1e-3])
-    points_m = _divided(points_m[apart])
+    points_m = _divided(_without_spurs(points_m))
     for _ in range(_HALVINGS if len(points_m) > 2 else 0):
         quarter, most = 0.75 * points_m[:-1] + 0.25 * points_m[1:], 0.25 * points_m[:-1] + 0.75 * points_m[1:]
         inner = np.stack([quarter, most], axis=1).reshape(-1, 2)
         points_m = np.concatenate([points_m[:1], inner[1:-1], points_m[-1:]])
     return points_m
+
+
+def _without_spurs(points_m: FloatArray) -> FloatArray:
+    """Leave out what is there twice, and where a way goes only to come back, as out of a circle and into it again."""
+    kept: list[FloatArray] = []
+    for point_m in points_m:
+        while len(kept) > 1 and _turns_back(kept[-2], kept[-1], point_m):
+            kept.pop()
+        if not kept or np.linalg.norm(point_m - kept[-1]) > _APART_M:
+            kept.append(point_m)
+    return np.array(kept)
+
+
+def _turns_back(before_m: FloatArray, at_m: FloatArray, after_m: FloatArray) -> bool:
+    there, back = at_m - before_m, after_m - at_m
+    return bool(there @ back < _TURNS_BACK * np.linalg.norm(there) * np.linalg.norm(back))
 
 
 def _divided(points_m: FloatArray) -> FloatArray:
