@@ -2,8 +2,8 @@
 
 python examples/pooled_errors/measure.py [--seeds 30] [--first 1001] [--frames 15] [--preset NAME ...] [--json FILE]
 
-Of every preset in which somebody works there are as many clips; `noisy_runs.py` says what is drawn and what is measured. The
-tables are those of `standoff evaluate coverage`, their intervals from a bootstrap over clips.
+Of every preset in which somebody works there are as many clips; `noisy_runs.py` says what is drawn and what is
+measured. The tables are those of `standoff evaluate coverage`, their intervals from a bootstrap over clips.
 """
 
 from __future__ import annotations
