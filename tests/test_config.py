@@ -7,7 +7,6 @@ import pytest
 import yaml
 from hypothesis import given
 from hypothesis import strategies as st
-from laws import examples
 from mutations import mutated
 
 from standoff.config import Settings, build_ground, build_stage, load_settings, resolved
@@ -341,7 +340,6 @@ proximity: {pairs: [[worker, excavator]]}
 """
 
 
-@examples(200)
 @given(mutated(st.just(_FILE)))
 def test_a_damaged_settings_file_is_settings_or_one_line(content: bytes) -> None:
     with TemporaryDirectory() as folder:

@@ -140,7 +140,7 @@ def _compare(
 
     require_truth(material, grouping)
     # What is no detector is to be known before the first hour of another one.
-    detectors = [candidate.open() for candidate in candidates]
+    detectors = [candidate.open(tells_points=material.knows_points) for candidate in candidates]
     results = []
     for candidate, detector in zip(candidates, detectors, strict=True):
         with progress(candidate.label, len(material.truth), unit="pictures") as on_frame:

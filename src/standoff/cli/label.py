@@ -40,7 +40,8 @@ def label(
     selection = SelectionParams(frames=frames, threshold=_part(threshold), least_gap_s=gap)
     plan = LabelPlan(source, selection, every_s=every, fps=fps, format=layout)
     with whole_folder(out, overwrite=overwrite, own=LABEL_FILES) as folder:
-        detector = OnnxDetector(find_model(model), DetectParams(score_threshold=min(threshold, LEAST_SCORE)))
+        params = DetectParams(score_threshold=min(threshold, LEAST_SCORE), ground_points="none")
+        detector = OnnxDetector(find_model(model), params)
         report = label_frames(plan, detector, folder, partial(progress, quiet=quiet))
     if not quiet:
         _tell(report, out)

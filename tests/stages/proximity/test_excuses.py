@@ -10,7 +10,6 @@ from stages.locate.test_ground_filter import wobbling
 from stages.proximity.test_meter import positions_of
 
 from standoff.core.classes import CLASS_BY_NAME
-from standoff.stages.locate.ground_filter import GroundFilter
 from standoff.stages.proximity.excuses import IN_CAB, PARKED, TOGETHER, Excuses
 from standoff.stages.proximity.params import ProximityParams
 
@@ -34,18 +33,17 @@ def test_a_machine_is_parked_after_its_time_and_not_any_more_once_it_moves() -> 
     assert told == ["", "", PARKED, PARKED, ""]
 
 
-@pytest.mark.parametrize("seed", range(6))
-def test_a_machine_that_is_placed_with_its_error_is_parked_while_it_stands_and_a_hazard_once_it_has_moved_off(
-    seed: int,
-) -> None:
+def test_a_machine_that_is_placed_with_its_error_is_parked_while_it_stands_and_a_hazard_once_it_has_moved_off() -> None:
     """Seen with errors that last, it moves off at 200 s with a metre a second more in each second."""
-    told = wobbling(GroundFilter(), seed, 3.0, 200.0, 206.0)
-    excuses = Excuses(ProximityParams(parked_after_s=60.0))
-    said = [excuse_of(excuses, (0.0, 0.0), (5.0, 0.0), standing_s=standing_s) for standing_s in told]
-    parked = said[round(60.0 / 0.2) : round(200.0 / 0.2)]
-    assert parked.count(PARKED) > 0.9 * len(parked)
-    # 2.5 m from where it stood, and for ever after.
-    assert set(said[round((200.0 + np.sqrt(5.0)) / 0.2) + 1 :]) == {""}
+    shares = []
+    for told in wobbling(3.0, 200.0, 206.0).T[:8]:
+        excuses = Excuses(ProximityParams(parked_after_s=60.0))
+        said = [excuse_of(excuses, (0.0, 0.0), (5.0, 0.0), standing_s=standing_s) for standing_s in told.tolist()]
+        parked = said[round(60.0 / 0.2) : round(200.0 / 0.2)]
+        shares.append(parked.count(PARKED) / len(parked))
+        # 2.5 m from where it stood, and for ever after.
+        assert set(said[round((200.0 + np.sqrt(5.0)) / 0.2) + 1 :]) == {""}
+    assert np.mean(shares) > 0.9
 
 
 def test_an_excavator_is_never_parked_and_no_machine_where_the_rule_is_off() -> None:

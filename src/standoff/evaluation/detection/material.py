@@ -58,6 +58,11 @@ class Material:
     is_whole: bool = False
     views: Mapping[int, GroundView] = field(default_factory=dict)
 
+    @property
+    def knows_points(self) -> bool:
+        """Whether a true ground point is marked in any picture."""
+        return any(np.isfinite(picture.foot_px).any() for picture in self.truth)
+
 
 def labelled_pictures(
     path: Path,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -42,17 +42,20 @@ class Candidate:
     model: Path
     slices: tuple[int, int]
 
-    def open(self) -> OnnxDetector:
+    def open(self, *, tells_points: bool = True) -> OnnxDetector:
         """Load the model.
+
+        Args:
+            tells_points: Whether the network of ground points goes along: of hundreds of boxes that nobody would be
+                shown it takes longer than all else.
 
         Raises:
             ModelError: It is no detector.
         """
         # As many boxes as COCO asks for, were all of one picture's of each class.
         most = MOST_OF_A_CLASS * len(CLASSES)
-        return OnnxDetector(
-            self.model, DetectParams(score_threshold=LEAST_SCORE, slices=self.slices, max_detections=most)
-        )
+        params = DetectParams(score_threshold=LEAST_SCORE, slices=self.slices, max_detections=most)
+        return OnnxDetector(self.model, params if tells_points else replace(params, ground_points="none"))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

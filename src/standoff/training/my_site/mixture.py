@@ -79,7 +79,8 @@ def prepare_plan(plan: RunPlan, out: Path, say: Callable[[str], None]) -> RunPla
 def _unlabelled(pictures: Sequence[LabelledPicture], absent: Sequence[str]) -> dict[str, list[list[float]]]:
     """Return by the stem of each picture the boxes that are ignored in it, those of its own labels included."""
     ids = [CLASS_BY_NAME[name].id for name in absent]
-    detector = OnnxDetector(find_model("site"), DetectParams(score_threshold=_UNLABELLED_SCORE))
+    params = DetectParams(score_threshold=_UNLABELLED_SCORE, ground_points="none")
+    detector = OnnxDetector(find_model("site"), params)
     regions: dict[str, list[list[float]]] = {}
     for picture in pictures:
         ignored = picture.xyxy_px[picture.ignored].tolist()

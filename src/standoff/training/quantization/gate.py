@@ -220,7 +220,7 @@ class Gate:
 
 
 def _open(model: Path) -> OnnxDetector:
-    return OnnxDetector(model, DetectParams(score_threshold=LEAST_SCORE, provider="cpu"))
+    return OnnxDetector(model, DetectParams(score_threshold=LEAST_SCORE, ground_points="none", provider="cpu"))
 
 
 def _time_ms(detector: OnnxDetector, frame: Frame) -> float:
