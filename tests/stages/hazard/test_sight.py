@@ -43,7 +43,8 @@ def test_fog_that_comes_and_goes_is_one_hazard() -> None:
     frames = [(GROUND, ground(share)) for share in [0.8] * 10 + [0.01] * 10 + [0.8] * 20]
     opened, closed = events_of(frames)
     assert 1.0 <= opened.time_s <= 1.5 and 2.0 <= closed.time_s <= 3.0
-    assert "fog" in opened.reason and closed.reason == "ground is watched again"
+    assert opened.reason.startswith("hardly any ground is watched: ") and "fog" in opened.reason
+    assert closed.reason == "ground is watched again"
 
 
 def test_enough_watched_ground_and_frames_that_nobody_judged_say_nothing() -> None:

@@ -25,6 +25,7 @@ Pair = tuple[int, int]
 MAP_IS_BACK = "ground map is back"
 STREAM_ENDED = "end of stream"
 NOTHING_WATCHED = "no ground is watched"
+HARDLY_WATCHED = "hardly any ground is watched"
 WATCHED_AGAIN = "ground is watched again"
 
 _NOBODY_JUDGED = WatchedGround()
@@ -130,7 +131,8 @@ class HazardMonitor(protocols.HazardMonitor):
         enough = (2.0 if self._sight.is_open else 1.0) * self._params.least_watched_share
         if not watched.judged or watched.share >= enough:
             return ""
-        return ": ".join([NOTHING_WATCHED, *list(watched.unwatched)[:1]])
+        how_little = HARDLY_WATCHED if watched.share > 0.0 else NOTHING_WATCHED
+        return ": ".join([how_little, *list(watched.unwatched)[:1]])
 
     def reset(self) -> None:
         """Forget everything without a word."""
