@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pyarrow as pa
 import pytest
-from simulation.flat_ground import FlatGround
+from flat_ground import FlatGround
 from tolerances import GEOMETRY_REL
 
 from standoff.clips import DEVICES_SCHEMA

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from flat_ground import FlatGround, camera, light
 from laws import seeds
-from simulation.flat_ground import FlatGround, camera, light
 from tolerances import GEOMETRY_REL
 
 from standoff.core.homography import FloatArray

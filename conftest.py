@@ -1,3 +1,5 @@
+"""What the tests of standoff and those of the simulator share."""
+
 from __future__ import annotations
 
 import os
@@ -13,8 +15,7 @@ from standoff.core.errors import MissingDependency
 
 register_profiles()
 
-_TESTS = Path(__file__).resolve().parent
-_PROJECT = _TESTS.parent
+_PROJECT = Path(__file__).resolve().parent
 
 
 @pytest.hookimpl(trylast=True)  # after hypothesis has read which profile is asked for

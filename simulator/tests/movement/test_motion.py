@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from laws import seeds
-from simulation.moving_models import MovingModel
+from moving_models import MovingModel
 from tolerances import GEOMETRY_REL
 
 from standoff.core.homography import FloatArray

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from simulation.flat_ground import FlatGround
+from flat_ground import FlatGround
 from tolerances import HULL_BOX_PX, SURVEYED_BOX_PX, SURVEYED_SHARE
 
 from standoff.core.camera import Camera

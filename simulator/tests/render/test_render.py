@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 import tolerances
-from simulation.flat_ground import FlatGround, camera, light, view
+from flat_ground import FlatGround, camera, light, view
 
 from standoff.core.camera import Camera
 from standoff.core.errors import MissingDependency

@@ -7,8 +7,8 @@ from functools import lru_cache
 import cv2
 import numpy as np
 import pytest
+from flat_ground import FlatGround
 from laws import seeds
-from simulation.flat_ground import FlatGround
 from tolerances import (
     BOARD_IN_PICTURE_PX,
     DISTORTION_PX,

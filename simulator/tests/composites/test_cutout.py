@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from simulation.flat_ground import FlatGround, camera, light, view
+from flat_ground import FlatGround, camera, light, view
 
 from standoff.core.homography import FloatArray
 from standoff.core.pose import View

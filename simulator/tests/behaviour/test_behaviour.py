@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from laws import seeds
-from simulation.moving_models import MovingModel
+from moving_models import MovingModel
 
 from standoff_sim import behaviour
 from standoff_sim.behaviour.digging import RATES_PS
