@@ -9,7 +9,7 @@ from laws import seeds
 from standoff.core.homography import FloatArray
 from standoff.core.pose import View
 from standoff_sim.camera.viewpoints import Obstacles, Passing, draw_flight, draw_view
-from standoff_sim.scene.moment import Body
+from standoff_sim.scene.moment import EntityState
 from standoff_sim.scene.scene import Batch, place
 from standoff_sim.solids.mesh import Surface, box, rotation, scaling, translation
 
@@ -17,21 +17,21 @@ _SIZE_PX = (320, 180)
 _NOTHING = Obstacles.of(())
 
 
-def _body(x_m: float, y_m: float) -> Body:
+def _body(x_m: float, y_m: float) -> EntityState:
     centre_m = np.array([x_m, y_m, 0.0])
-    return Body(1, 0, (), (), centre_m, 0.0, np.zeros(2), np.zeros((4, 2)), np.full(3, np.nan))
+    return EntityState(1, 0, (), (), centre_m, 0.0, np.zeros(2), np.zeros((4, 2)), np.full(3, np.nan))
 
 
 def _tower(height_m: float, pose: FloatArray) -> Batch:
     return place(box((2.0, 4.0, height_m), (0.5, 0.5, 0.5), Surface.CONCRETE), pose)
 
 
-def _views(bodies: list[Body], obstacles: Obstacles = _NOTHING, count: int = 60) -> list[View]:
+def _views(bodies: list[EntityState], obstacles: Obstacles = _NOTHING, count: int = 60) -> list[View]:
     rng = np.random.default_rng(1)
     return [draw_view(rng, _SIZE_PX, bodies, obstacles) for _ in range(count)]
 
 
-def _shown(view: View, bodies: list[Body]) -> int:
+def _shown(view: View, bodies: list[EntityState]) -> int:
     px = view.project(np.array([body.centre_m for body in bodies]))
     return int(((px >= 0) & (px <= _SIZE_PX)).all(axis=1).sum())
 

@@ -16,7 +16,7 @@ from standoff.clips import CLIP_FRAMES_SCHEMA, DEVICES_SCHEMA, NOISY_DETECTIONS_
 from standoff.config import load_settings
 from standoff.core.homography import FloatArray
 from standoff_sim.clip.presets import Plan, plan_clip
-from standoff_sim.clip.record import record_cameras, record_clip, record_truth
+from standoff_sim.clip.write_clip import record_cameras, record_clip, record_truth
 
 _FRAMES = 3
 _SCHEMAS = {

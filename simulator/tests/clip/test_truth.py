@@ -18,7 +18,7 @@ from standoff_sim.clip.truth import (
     pair_rows,
     visible_boxes_px,
 )
-from standoff_sim.scene.moment import Body, Moment
+from standoff_sim.scene.moment import EntityState, Moment
 from standoff_sim.scene.scene import place
 from standoff_sim.solids.mesh import ball, box, rotation, srgb, translation
 
@@ -30,9 +30,9 @@ _VIEW = View.aimed(_CAMERA, np.array([0.0, -20.0, 20.0]), heading_deg=0.0, pitch
 
 def _body(
     entity_id: int, class_id: int, x_m: float, y_m: float, tip_m: tuple[float, float, float] | None = None
-) -> Body:
+) -> EntityState:
     square = np.array([[-1.0, -0.5], [1.0, -0.5], [1.0, 0.5], [-1.0, 0.5]])
-    return Body(
+    return EntityState(
         entity_id,
         class_id,
         (place(box((2.0, 1.0, 1.0), srgb("#808080")), translation(x_m, y_m, 0.0), entity_id=entity_id),),
@@ -45,7 +45,7 @@ def _body(
     )
 
 
-def _moment(*bodies: Body) -> Moment:
+def _moment(*bodies: EntityState) -> Moment:
     return Moment(0.5, _VIEW, bodies, (), (), False)
 
 

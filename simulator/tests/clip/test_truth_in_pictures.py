@@ -21,7 +21,7 @@ from tolerances import (
 from standoff.core.homography import FloatArray
 from standoff_sim.camera.flight import Still, drone_camera
 from standoff_sim.clip.presets import PRESETS, plan_clip
-from standoff_sim.clip.studio import Shot, Studio
+from standoff_sim.clip.studio import RenderedFrame, Studio
 from standoff_sim.movement.motion import sample
 from standoff_sim.render import Look, Renderer
 from standoff_sim.scene.light import random_light
@@ -41,14 +41,14 @@ for_every_preset = pytest.mark.parametrize(
 
 
 @lru_cache(maxsize=len(PRESETS))
-def _clean_shot(name: str) -> tuple[Site, Shot]:
+def _clean_shot(name: str) -> tuple[Site, RenderedFrame]:
     plan = plan_clip(name, seed=5, width_px=_WIDTH_PX, height_px=_HEIGHT_PX)
     site = build_site(plan)
     with Studio(site) as studio:
         return site, studio.shoot(0, 0.1 * plan.duration_s, clean=True)
 
 
-def _view_of(shot: Shot) -> tuple[FloatArray, FloatArray]:
+def _view_of(shot: RenderedFrame) -> tuple[FloatArray, FloatArray]:
     """Return OpenCV's rotation vector and translation of the camera."""
     site_to_camera = np.array(shot.frame["site_to_camera"]).reshape(3, 3)
     position_m = np.array([shot.frame[f"camera_{axis}_m"] for axis in "xyz"])

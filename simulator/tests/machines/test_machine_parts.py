@@ -10,8 +10,8 @@ from standoff_sim.machines.digging import knee_m
 from standoff_sim.machines.joints import settle
 from standoff_sim.machines.machine_parts import Crawler, Ram, cab, ram_poses, scoop, strut_pose, wheel
 from standoff_sim.machines.paint import Painted, draw_livery, weather
-from standoff_sim.machines.running_gear import Axles, Tracks
-from standoff_sim.solids.heap import soil_heap
+from standoff_sim.machines.running_gear import Axles, Crawlers
+from standoff_sim.solids.loose_material import soil_heap
 from standoff_sim.solids.mesh import Mesh, srgb
 
 _CRAWLER = Crawler(4.4, 0.95, 0.6, 45)
@@ -107,7 +107,7 @@ def test_wheels_and_tracks_are_placed_where_they_belong() -> None:
     (batch,) = Axles(painted, 0.5, np.array([[1.0, 0.5, 0.5], [-1.0, -0.5, 0.5]])).batches(0.5 * np.pi / 2)
     np.testing.assert_allclose(batch.poses[:, :3, 3], [[1.0, 0.5, 0.5], [-1.0, -0.5, 0.5]])
     np.testing.assert_allclose(batch.poses[0, :3, 2], [1.0, 0.0, 0.0], atol=1e-6)
-    shoes, frames = Tracks(_CRAWLER, 2.2, painted, painted).batches(0.0)
+    shoes, frames = Crawlers(_CRAWLER, 2.2, painted, painted).batches(0.0)
     assert len(shoes.poses) == 2 * _CRAWLER.shoes
     np.testing.assert_allclose(frames.poses[:, 1, 3], [-1.1, 1.1], rtol=1e-6)
 

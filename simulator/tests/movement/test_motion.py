@@ -14,8 +14,8 @@ from standoff.core.homography import FloatArray
 from standoff_sim.movement.driving import MOBILITY, drive, walk
 from standoff_sim.movement.motion import (
     STEP_S,
+    MotionState,
     Place,
-    Placement,
     chained,
     eased,
     end_place,
@@ -29,7 +29,7 @@ from standoff_sim.movement.motion import (
     with_joints,
     wrapped,
 )
-from standoff_sim.scene.scene import Ground, Motion
+from standoff_sim.scene.scene import GroundSurface, Motion
 
 angles = st.floats(-3.1, 3.1)
 offsets = st.floats(-40.0, 40.0)
@@ -47,7 +47,7 @@ class Slope:
         return heights
 
 
-def _slope(east: float, north: float) -> Ground:
+def _slope(east: float, north: float) -> GroundSurface:
     return Slope(east, north)  # type: ignore[return-value]
 
 
@@ -191,7 +191,7 @@ def test_joints_are_kept_within_the_models_ranges() -> None:
 @given(st.floats(-0.3, 0.3), st.floats(-0.3, 0.3), angles, offsets, offsets)
 def test_a_machine_lies_flat_on_a_slope(east: float, north: float, heading_rad: float, x_m: float, y_m: float) -> None:
     model, ground = MovingModel("wheel_loader"), _slope(east, north)
-    placement = Placement(np.array([x_m, y_m]), heading_rad, np.zeros(2), {})
+    placement = MotionState(np.array([x_m, y_m]), heading_rad, np.zeros(2), {})
     pose = place_on_ground(placement, model.footprint_m, ground)
     corners_m = np.column_stack([model.footprint_m, np.zeros(4), np.ones(4)]) @ pose.T
     np.testing.assert_allclose(corners_m[:, 2], ground.height_at(corners_m[:, :2]), atol=1e-9)
@@ -202,7 +202,7 @@ def test_a_machine_lies_flat_on_a_slope(east: float, north: float, heading_rad: 
 
 
 def test_a_person_stands_upright_on_a_slope() -> None:
-    placement = Placement(np.array([3.0, 4.0]), 0.5, np.zeros(2), {})
+    placement = MotionState(np.array([3.0, 4.0]), 0.5, np.zeros(2), {})
     pose = place_on_ground(placement, MovingModel("worker").footprint_m, _slope(0.2, -0.1))
     np.testing.assert_allclose(pose[:3, 2], [0.0, 0.0, 1.0])
     assert pose[2, 3] == pytest.approx(1.0 + 0.6 - 0.4)

@@ -14,7 +14,7 @@ from standoff_sim.camera.flight import Still
 from standoff_sim.clip.truth import full_box_px
 from standoff_sim.movement.motion import Place, sample
 from standoff_sim.people.worker import make_worker
-from standoff_sim.scene.cast import Cast, Stage, is_person
+from standoff_sim.scene.cast import Cast, FilmedArea, is_person
 from standoff_sim.scene.casting import CASTS, bend_over
 from standoff_sim.scene.moment import scene_at
 from standoff_sim.scene.scene import Actor, Scene
@@ -23,8 +23,8 @@ _LASTING_S = 60.0
 
 
 def _cast(mean_stature_m: float, *, share: float = 0.0, name: str = "demo") -> Cast:
-    stage = Stage(0.0, 1.0, _LASTING_S, None, (-3.0, -2.0), mean_stature_m)
-    cast = CASTS[name](np.random.default_rng(4), stage)
+    area = FilmedArea(0.0, 1.0, _LASTING_S, None, (-3.0, -2.0), mean_stature_m)
+    cast = CASTS[name](np.random.default_rng(4), area)
     bend_over(np.random.default_rng(5), cast, share)
     return cast
 

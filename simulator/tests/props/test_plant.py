@@ -12,7 +12,7 @@ from standoff_sim.props.plant import PLANT
 from standoff_sim.props.prop import Prop
 from standoff_sim.scene.scene import Batch, moved
 from standoff_sim.solids.bars import bars, corrugated, grid, lattice
-from standoff_sim.solids.heap import heap
+from standoff_sim.solids.loose_material import heap
 from standoff_sim.solids.mesh import Mesh, Surface, rotation, srgb, translation
 
 _SEEDS = range(4)

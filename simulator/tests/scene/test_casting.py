@@ -12,16 +12,16 @@ from standoff.core.classes import CLASS_BY_NAME, CLASSES
 from standoff_sim.behaviour import idle
 from standoff_sim.movement.motion import Place, sample
 from standoff_sim.people.worker import make_worker
-from standoff_sim.scene.cast import Cast, Stage, is_person, swept
+from standoff_sim.scene.cast import Cast, FilmedArea, is_person, swept
 from standoff_sim.scene.casting import CASTS, crowd
 from standoff_sim.scene.scene import Actor
 
 _LASTING_S = 4.0
-_STAGE = Stage(30.0, 1.0, _LASTING_S, None, (-3.0, -2.0))
+_STAGE = FilmedArea(30.0, 1.0, _LASTING_S, None, (-3.0, -2.0))
 
 
-def _cast(name: str, seed: int, stage: Stage = _STAGE) -> Cast:
-    return CASTS[name](np.random.default_rng(seed), stage)
+def _cast(name: str, seed: int, area: FilmedArea = _STAGE) -> Cast:
+    return CASTS[name](np.random.default_rng(seed), area)
 
 
 def _placed(actor: Actor, time_s: float) -> tuple[float, ...]:
@@ -111,13 +111,13 @@ def test_the_stationary_cast_keeps_its_distance(distance_m: int, seed: int) -> N
 
 
 def test_a_stage_turns_with_the_camera() -> None:
-    east = Stage(90.0, 1.0, 1.0, None, None).place(2.0, 5.0)
+    east = FilmedArea(90.0, 1.0, 1.0, None, None).place(2.0, 5.0)
     np.testing.assert_allclose(east.xy_m, [5.0, -2.0], atol=1e-12)
 
 
 @pytest.mark.parametrize("seed", seeds(6))
 def test_the_demo_has_one_near_miss_and_one_breach_whatever_the_seed(seed: int) -> None:
-    actors = _cast("demo", seed, Stage(60.0 * seed, 1.0, 14.0, None, None)).actors
+    actors = _cast("demo", seed, FilmedArea(60.0 * seed, 1.0, 14.0, None, None)).actors
     workers = [actor for actor in actors if is_person(actor.model)]
     gaps_m = []
     for worker in workers:

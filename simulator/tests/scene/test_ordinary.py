@@ -11,7 +11,7 @@ from standoff.core.classes import CLASSES
 from standoff.core.homography import FloatArray
 from standoff_sim import behaviour
 from standoff_sim.movement.motion import Place, sample
-from standoff_sim.scene.cast import Cast, Stage, is_person
+from standoff_sim.scene.cast import Cast, FilmedArea, is_person
 from standoff_sim.scene.casting import CASTS
 from standoff_sim.scene.scene import Actor
 
@@ -21,7 +21,7 @@ _ABOARD_M = 1.5
 
 
 def _site(seed: int) -> Cast:
-    return CASTS["ordinary"](np.random.default_rng(seed), Stage(20.0 * seed, 1.0, _LASTING_S, None, (-3.0, -2.0)))
+    return CASTS["ordinary"](np.random.default_rng(seed), FilmedArea(20.0 * seed, 1.0, _LASTING_S, None, (-3.0, -2.0)))
 
 
 def _places(actor: Actor) -> FloatArray:

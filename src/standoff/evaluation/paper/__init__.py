@@ -7,18 +7,18 @@ for figure in evaluate_clip(load_clip("clips/mobile"), Trial(method="oriented"))
     print(figure.label, figure.paper, figure.measured, figure.unit)
 """
 
+from standoff.evaluation.paper.monitor_setup import MonitorSetup
 from standoff.evaluation.paper.pooled import PooledMap, pool
 from standoff.evaluation.paper.report import write_report
 from standoff.evaluation.paper.result import ClipResult, PaperFigure, evaluate_clip
-from standoff.evaluation.paper.trial import Trial
 from standoff.evaluation.paper.truth_detector import BoxError
 
 __all__ = [
     "BoxError",
     "ClipResult",
+    "MonitorSetup",
     "PaperFigure",
     "PooledMap",
-    "Trial",
     "evaluate_clip",
     "pool",
     "write_report",

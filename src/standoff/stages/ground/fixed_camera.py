@@ -11,7 +11,7 @@ from standoff.core import homography, protocols
 from standoff.core.homography import FloatArray
 from standoff.core.protocols import AnyGround, AnyMotion
 from standoff.core.types import CameraMotion, Detections, Frame, GroundMap, NoGroundMap
-from standoff.stages.ground.surveyed import SurveyedGround
+from standoff.stages.ground.surveyed_ground import SurveyedGround
 
 MOVED = "the camera has moved since the survey"
 OUT_OF_SIGHT = "the background of the survey is out of sight"

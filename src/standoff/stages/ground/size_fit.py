@@ -16,7 +16,7 @@ import numpy as np
 from standoff.core.homography import FloatArray
 from standoff.core.pose import poses_of_plane
 from standoff.core.types import IntArray
-from standoff.stages.ground.upright import log_sizes
+from standoff.stages.ground.upright_body import log_sizes
 
 STATURE_M = 1.78
 """Sole to the top of the hat of somebody 1.75 m tall, less what people bend a little while they work."""

@@ -13,7 +13,7 @@ from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.pose import View, view_from_homography
 from standoff.core.types import GroundMap, IntArray
 from standoff.stages.ground.size_fit import BODY_M, STATURE_M
-from standoff.stages.ground.upright import log_sizes
+from standoff.stages.ground.upright_body import log_sizes
 
 WARNING_FACTOR = 1.6
 """Sizes this many times too large or too small are worth a warning: no crew and no fleet is."""

@@ -13,18 +13,18 @@ from standoff.core.camera import CameraPrior
 from standoff.core.homography import FloatArray
 from standoff.core.pose import View
 from standoff.core.types import Detections, ImageArray, Luma, NoGroundMap, Picture
+from standoff.stages.ground.corner_order import turned_like
 from standoff.stages.ground.params import ReferenceParams
 from standoff.stages.ground.placement import Placement, Through
 from standoff.stages.ground.pose_filter import Estimate
 from standoff.stages.ground.projection import project, project_with_jacobians
+from standoff.stages.ground.reference_place import NOT_SEEN, GivenPlace, detected_box
 from standoff.stages.ground.shape import ReferenceShape
 from standoff.stages.ground.solid import HEIGHT, SolidState
 from standoff.stages.ground.solid_choice import Found
 from standoff.stages.ground.solid_fit import Belief, fit_solid
 from standoff.stages.ground.solid_foot import with_foot
 from standoff.stages.ground.solid_search import HeightPrior, search_solid
-from standoff.stages.ground.turned import turned_like
-from standoff.stages.ground.where import NOT_SEEN, GivenPlace, detected_box
 
 _LEAST_REACH_PX, _MOST_REACH_PX = 5.0, 8.0
 _REACH_SIGMAS = 4.0

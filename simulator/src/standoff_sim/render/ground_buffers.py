@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from standoff.core.homography import FloatArray
-from standoff_sim.scene.scene import Ground
+from standoff_sim.scene.scene import GroundSurface
 from standoff_sim.solids.mesh import Float32Array
 
 _TILE_CELLS = 32
@@ -25,7 +25,7 @@ class Culler(Protocol):
         ...
 
 
-def grid_vertices(ground: Ground) -> Float32Array:
+def grid_vertices(ground: GroundSurface) -> Float32Array:
     """Return (ny + 2, nx + 2, 3) positions; the outer ring lies far outside at the border's height."""
     rows, columns = ground.height_m.shape
     x = ground.origin_xy_m[0] + ground.cell_m * np.arange(columns)
@@ -38,7 +38,7 @@ def grid_vertices(ground: Ground) -> Float32Array:
     return table
 
 
-def slope_picture(ground: Ground) -> npt.NDArray[np.float16]:
+def slope_picture(ground: GroundSurface) -> npt.NDArray[np.float16]:
     """Return (ny, nx, 2) slopes towards east and north at the height samples."""
     north, east = np.gradient(ground.height_m, ground.cell_m)
     slopes: npt.NDArray[np.float16] = np.stack([east, north], axis=-1).astype(np.float16)
@@ -61,7 +61,7 @@ def grid_triangles(rows: int, columns: int) -> tuple[npt.NDArray[np.uint32], npt
     return corners.astype(np.uint32), np.flatnonzero(np.diff(tile[order], prepend=-1))
 
 
-def encoded_picture(ground: Ground) -> npt.NDArray[np.uint8]:
+def encoded_picture(ground: GroundSurface) -> npt.NDArray[np.uint8]:
     """Return (h, w, 4): the square root of linear albedo, which is cheap to decode, and wetness."""
     code = np.arange(256) / 255.0
     linear = np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4)
@@ -97,10 +97,10 @@ def upload_with_mipmaps(context: Any, picture: npt.NDArray[np.uint8], *, smooth:
     return texture
 
 
-class Relief:
+class GroundBuffers:
     """The ground of one scene in GPU memory."""
 
-    def __init__(self, context: Any, ground: Ground) -> None:  # noqa: ANN401
+    def __init__(self, context: Any, ground: GroundSurface) -> None:  # noqa: ANN401
         vertices = grid_vertices(ground)
         corners, starts = grid_triangles(*vertices.shape[:2])
         self._commands = np.zeros((len(starts), 5), np.uint32)
@@ -131,7 +131,7 @@ class Relief:
         self._context = context
 
     @staticmethod
-    def _dust_colour(ground: Ground) -> FloatArray:
+    def _dust_colour(ground: GroundSurface) -> FloatArray:
         """Dust is the soil's colour, dry: a little lighter and greyer than what lies on the ground."""
         mean = (np.asarray(ground.albedo[::8, ::8], dtype=np.float64) / 255.0).reshape(-1, 3).mean(axis=0) ** 2.2
         dust: FloatArray = np.clip(1.25 * (0.8 * mean + 0.2 * (mean @ _LUMA)) + 0.02, 0.0, 0.6)

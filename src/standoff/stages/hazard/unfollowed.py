@@ -7,7 +7,7 @@ from collections import deque
 from standoff.core.homography import BoolArray
 from standoff.core.types import Hazard
 from standoff.core.unfollowed import are_many
-from standoff.stages.hazard.life import Latch, StreamHazard
+from standoff.stages.hazard.latch import Latch, StreamHazard
 from standoff.stages.hazard.params import HazardParams
 
 NOT_FOLLOWED = "sure detections are in no track"
@@ -17,7 +17,7 @@ _WINDOW_S = 3.0
 _FEWEST_LOOKS = 3
 
 
-class FollowWatch(StreamHazard):
+class UnfollowedHazard(StreamHazard):
     """The hazard of a stream in which many sure detections belong to no track.
 
     Args:

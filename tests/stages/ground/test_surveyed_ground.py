@@ -15,7 +15,7 @@ from standoff.core.errors import GroundError
 from standoff.core.homography import FloatArray
 from standoff.core.types import Detections, Frame, GroundMap, ImageArray, Luma, NoCameraMotion, NoGroundMap
 from standoff.stages.frames.pictures import halved
-from standoff.stages.ground.surveyed import SurveyedGround
+from standoff.stages.ground.surveyed_ground import SurveyedGround
 
 STILL = NoCameraMotion("not estimated")
 

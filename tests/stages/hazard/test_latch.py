@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from standoff.stages.hazard.life import Latch
+from standoff.stages.hazard.latch import Latch
 
 
 def states(latch: Latch, conditions: str, step_s: float = 0.25) -> str:

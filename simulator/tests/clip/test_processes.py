@@ -9,7 +9,7 @@ from functools import partial
 import pytest
 
 from standoff.core.errors import DataError, SimulationError
-from standoff_sim.clip.crew import _Hand, work_through
+from standoff_sim.clip.processes import _Hand, work_through
 
 
 @contextmanager

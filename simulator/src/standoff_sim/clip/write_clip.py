@@ -43,11 +43,11 @@ from standoff.files.yaml_text import write_yaml
 from standoff_sim.camera.sensor import VideoWriter
 from standoff_sim.camera.telemetry import Origin, ShownSettings, write_telemetry
 from standoff_sim.clip.coco import Annotations
-from standoff_sim.clip.crew import work_through
 from standoff_sim.clip.detection_noise import NoisyDetector
 from standoff_sim.clip.presets import Plan
-from standoff_sim.clip.studio import Shot, Studio
-from standoff_sim.clip.survey import Surveyor
+from standoff_sim.clip.processes import work_through
+from standoff_sim.clip.site_truth import SiteTruth
+from standoff_sim.clip.studio import RenderedFrame, Studio
 from standoff_sim.clip.truth import FrameTruth, Row
 from standoff_sim.clip.wearables import report_positions
 from standoff_sim.scene.scene import Actor, Reference
@@ -115,7 +115,7 @@ def record_truth(
     """Write a clip's truth, its telemetry and what a detector might find, without a picture.
 
     Positions are those of the rendered clip, bit for bit; what is visible is approximated, see
-    `standoff_sim.scene.sights`. There are `detections.parquet` instead of `video.mp4` and `annotations.json`.
+    `standoff_sim.scene.occlusion`. There are `detections.parquet` instead of `video.mp4` and `annotations.json`.
 
     Args:
         plan: What to write.
@@ -131,7 +131,7 @@ def record_truth(
         site, times_s = build_site(plan), frame_times_s(plan)
         size_px = (plan.preset.width_px, plan.preset.height_px)
         detector = NoisyDetector(size_px, np.random.default_rng([plan.seed, _DETECTIONS, plan.camera]))
-        truths = _work(open_surveyor, plan, site, times_s, processes)
+        truths = _work(open_site_truth, plan, site, times_s, processes)
         with closing(truths), Tables(folder, detected=True) as tables:
             for truth in truths:
                 found = detector.detect(truth.index, truth.frame["time_s"], truth.entities)
@@ -174,19 +174,21 @@ def _work(
 
 
 @contextmanager
-def open_shooter(plan: Plan, site: Site | None = None) -> Generator[Callable[[tuple[int, float]], Shot], None, None]:
+def open_shooter(
+    plan: Plan, site: Site | None = None
+) -> Generator[Callable[[tuple[int, float]], RenderedFrame], None, None]:
     """Give a function from a frame's index and time to the frame; the site is built where it is not given."""
     with Studio(site or build_site(plan)) as studio:
         yield lambda job: studio.shoot(*job)
 
 
 @contextmanager
-def open_surveyor(
+def open_site_truth(
     plan: Plan, site: Site | None = None
 ) -> Generator[Callable[[tuple[int, float]], FrameTruth], None, None]:
     """Give a function from a frame's index and time to what is true in it; it draws nothing."""
-    surveyor = Surveyor(site or build_site(plan))
-    yield lambda job: surveyor.survey(*job)
+    truth = SiteTruth(site or build_site(plan))
+    yield lambda job: truth.at(*job)
 
 
 class Tables:
@@ -214,7 +216,7 @@ class Tables:
             if failure is None:
                 self._flush(least=0)
 
-    def add(self, truth: Shot | FrameTruth, detections: Sequence[Row] = ()) -> None:
+    def add(self, truth: RenderedFrame | FrameTruth, detections: Sequence[Row] = ()) -> None:
         """Add a frame."""
         added = {
             TRUTH_FILE: truth.entities,

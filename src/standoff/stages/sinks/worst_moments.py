@@ -12,9 +12,9 @@ from standoff.core.homography import FloatArray
 from standoff.core.lengths import LengthUnit
 from standoff.core.types import Frame, ImageArray
 from standoff.stages.sinks.blurring import blur
+from standoff.stages.sinks.frame_measurements import FrameMeasurements
 from standoff.stages.sinks.overlay import Overlay
 from standoff.stages.sinks.params import DrawParams
-from standoff.stages.sinks.scene import Scene
 from standoff.stages.sinks.sketch import Sketch
 
 _CLOSER_BY_M = 0.1
@@ -25,7 +25,7 @@ _DRAWN_WIDTH_PX = 800
 
 
 @dataclass(frozen=True, slots=True)
-class Moment:
+class WorstMoment:
     """A pair at its closest so far.
 
     Attributes:
@@ -37,7 +37,7 @@ class Moment:
         severity: Of the pair's hazard at that time; empty without one.
         picture: (H, W, 3) uint8 BGR, a region of the frame.
         region_px: (4,) which region, in full-size pixels.
-        scene: What to draw over it.
+        measurements: What to draw over it.
     """
 
     names: tuple[str, str]
@@ -48,14 +48,14 @@ class Moment:
     severity: str
     picture: ImageArray
     region_px: FloatArray
-    scene: Scene
+    measurements: FrameMeasurements
 
     def jpeg(self, unit: LengthUnit) -> bytes:
         """Return the picture with the measurements drawn over it."""
         factor = max(1.0, _DRAWN_WIDTH_PX / self.picture.shape[1])
         drawn = cv2.resize(self.picture, None, fx=factor, fy=factor, interpolation=cv2.INTER_CUBIC).astype(np.uint8)
         params = DrawParams(size=1.5, legend=False)
-        Overlay(params).draw(drawn, Sketch.of(self.scene, params, unit), self.region_px)
+        Overlay(params).draw(drawn, Sketch.of(self.measurements, params, unit), self.region_px)
         return cv2.imencode(".jpg", drawn, [cv2.IMWRITE_JPEG_QUALITY, 82])[1].tobytes()
 
 
@@ -71,42 +71,42 @@ class WorstMoments:
 
     def __init__(self, count: int, width_px: int) -> None:
         self._count, self._width_px = count, width_px
-        self._kept: dict[Pair, Moment] = {}
+        self._kept: dict[Pair, WorstMoment] = {}
 
-    def offer(self, frame: Frame, scene: Scene) -> None:
+    def offer(self, frame: Frame, measurements: FrameMeasurements) -> None:
         """Keep this frame's pairs that are closer than what is kept. Outlier-filtered distances are passed over."""
-        pairs = scene.proximities
+        pairs = measurements.proximities
         measured = np.isfinite(pairs.gap_m) & ~pairs.filtered
         for k in np.flatnonzero(measured & (pairs.gap_m < self._limit_m())):
             pair = (int(pairs.track_a[k]), int(pairs.track_b[k]))
             earlier = self._kept.get(pair)
             if self._count and pairs.gap_m[k] < (earlier.gap_m - _CLOSER_BY_M if earlier else self._limit_m()):
-                self._kept[pair] = self._moment(frame, scene, int(k), pair)
+                self._kept[pair] = self._moment(frame, measurements, int(k), pair)
             if len(self._kept) > self._count:
                 del self._kept[max(self._kept, key=lambda key: self._kept[key].gap_m)]
 
     def _limit_m(self) -> float:
         return max(moment.gap_m for moment in self._kept.values()) if len(self._kept) >= self._count > 0 else np.inf
 
-    def _moment(self, frame: Frame, scene: Scene, k: int, pair: Pair) -> Moment:
-        pairs, names = scene.proximities, scene.names()
-        hazard = scene.hazards.get(pair)
-        boxes = scene.tracks.xyxy_px[np.isin(scene.tracks.track_id, pair)]
+    def _moment(self, frame: Frame, measurements: FrameMeasurements, k: int, pair: Pair) -> WorstMoment:
+        pairs, names = measurements.proximities, measurements.names()
+        hazard = measurements.hazards.get(pair)
+        boxes = measurements.tracks.xyxy_px[np.isin(measurements.tracks.track_id, pair)]
         picture, region = _around(frame, boxes, self._width_px)
-        blur(picture, scene.hidden_px, region)
-        return Moment(
+        blur(picture, measurements.hidden_px, region)
+        return WorstMoment(
             names=(names[pair[0]], names[pair[1]]),
-            time_s=scene.time_s,
+            time_s=measurements.time_s,
             distance_m=float(pairs.distance_m[k]),
             gap_m=float(pairs.gap_m[k]),
             sigma_m=float(pairs.sigma_m[k]),
             severity=hazard.severity if hazard else "",
             picture=picture,
             region_px=region,
-            scene=scene,
+            measurements=measurements,
         )
 
-    def worth_showing(self, below_m: float) -> list[Moment]:
+    def worth_showing(self, below_m: float) -> list[WorstMoment]:
         """Return the moments with a gap below a limit, but at least the closest one, smallest gap first."""
         moments = sorted(self._kept.values(), key=lambda moment: moment.gap_m)
         return [moment for i, moment in enumerate(moments) if i == 0 or moment.gap_m < below_m]

@@ -12,7 +12,7 @@ from tolerances import TRIALS_SHARE
 
 from standoff.core.homography import FloatArray
 from standoff.core.zones import Zone
-from standoff.stages.hazard.inside import probability_inside
+from standoff.stages.hazard.inside_zone import probability_inside
 
 CONCAVE = np.array([[0.0, 0.0], [6.0, 0.0], [6.0, 4.0], [3.0, 1.0], [0.0, 4.0]])
 ASIDE = np.array([9.0, 1.0])

@@ -12,7 +12,7 @@ from standoff.core.homography import FloatArray
 from standoff.stages.ground import ReferenceShape
 
 
-class Turning:
+class CornerOrder:
     """Compares found corners with true ones and turns positions accordingly.
 
     Args:

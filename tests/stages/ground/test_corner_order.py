@@ -6,9 +6,9 @@ from drawn_solid import lens, random_state, top_px
 from tolerances import SAME_MAP_M
 
 from standoff.stages.ground import ReferenceShape
+from standoff.stages.ground.corner_order import doubt_between, turned_like
 from standoff.stages.ground.solid import STATE, SolidState
 from standoff.stages.ground.solid_fit import Belief
-from standoff.stages.ground.turned import doubt_between, turned_like
 
 SQUARE = ReferenceShape.square(2.0)
 HEXAGON = ReferenceShape.regular(6, 1.5)

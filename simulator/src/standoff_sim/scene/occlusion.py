@@ -20,8 +20,8 @@ from standoff.core.camera import Camera
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.pose import View
 from standoff_sim.clip.truth import Sight
-from standoff_sim.scene.moment import Body, Moment
-from standoff_sim.scene.scene import NOTHING, Batch, Ground, Scene
+from standoff_sim.scene.moment import EntityState, Moment
+from standoff_sim.scene.scene import NOTHING, Batch, GroundSurface, Scene
 from standoff_sim.solids.lumps import IntArray, Lumps, lumps_of
 
 _WIDEST_PX = 1280
@@ -62,7 +62,7 @@ class _Still:
     radius_m: FloatArray
 
     @classmethod
-    def of(cls, batches: Sequence[Batch], ground: Ground) -> _Still:
+    def of(cls, batches: Sequence[Batch], ground: GroundSurface) -> _Still:
         """Take what is large, near and high enough to hide somebody."""
         lumps = lumps_of(batches, wires=False)
         if not len(lumps.starts):
@@ -136,7 +136,7 @@ class Outlines:
         reference = scene.reference
         self._carpet = reference.entity_id if reference is not None and reference.height_m < _LOW_M else NOTHING
 
-    def sights(self, moment: Moment) -> list[tuple[Body, Sight]]:
+    def sights(self, moment: Moment) -> list[tuple[EntityState, Sight]]:
         """Return every body, and the parked vehicles that show, with how they show."""
         view = moment.view
         showing = self._may_show(view)

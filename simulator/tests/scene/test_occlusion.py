@@ -9,16 +9,16 @@ from standoff.core.camera import Camera
 from standoff.core.homography import FloatArray
 from standoff_sim.camera.flight import Still
 from standoff_sim.clip.presets import plan_clip
+from standoff_sim.clip.site_truth import SiteTruth
 from standoff_sim.clip.studio import Studio
-from standoff_sim.clip.survey import Surveyor
 from standoff_sim.clip.truth import Sight, full_box_px
 from standoff_sim.machines.excavator import make_excavator
 from standoff_sim.movement.motion import Place, held
 from standoff_sim.people.worker import make_worker
 from standoff_sim.scene.light import random_light
 from standoff_sim.scene.moment import scene_at
+from standoff_sim.scene.occlusion import Outlines
 from standoff_sim.scene.scene import Actor, Batch, Model, Scene, place
-from standoff_sim.scene.sights import Outlines
 from standoff_sim.scene.site import build_site
 from standoff_sim.solids.lumps import cut, lumps_of
 from standoff_sim.solids.mesh import box, join, translation, tube
@@ -107,13 +107,13 @@ def test_some_lumps_of_many_are_the_same_lumps() -> None:
 
 @pytest.mark.live
 @pytest.mark.usefixtures("opengl")
-def test_a_surveyed_frame_says_what_the_rendered_one_shows() -> None:
+def test_a_true_frame_says_what_the_rendered_one_shows() -> None:
     site = build_site(plan_clip("virtual", seed=5, width_px=1280, height_px=720))
     with Studio(site) as studio:
         shot = studio.shoot(0, 0.5, clean=True)
-    surveyed = Surveyor(site).survey(0, 0.5)
-    np.testing.assert_equal(surveyed.pairs, shot.pairs)
-    truth = {row["entity_id"]: row for row in surveyed.entities}
+    true = SiteTruth(site).at(0, 0.5)
+    np.testing.assert_equal(true.pairs, shot.pairs)
+    truth = {row["entity_id"]: row for row in true.entities}
     checked = 0
     for row in (row for row in shot.entities if row["entity_id"] <= 1000):
         other = truth[row["entity_id"]]

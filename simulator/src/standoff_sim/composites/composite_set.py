@@ -20,9 +20,9 @@ from standoff.files.whole import whole_folder
 from standoff.labels.types import Split
 from standoff_sim.camera.flight import Still
 from standoff_sim.camera.sensor import Sensor
-from standoff_sim.clip.crew import work_through
-from standoff_sim.clip.picture_set import SET_FILES, Picture, PictureSet, draw_split, is_marked
+from standoff_sim.clip.picture_set import SET_FILES, LabelledImage, PictureSet, draw_split, is_marked
 from standoff_sim.clip.presets import Condition, check_seed, check_size
+from standoff_sim.clip.processes import work_through
 from standoff_sim.clip.truth import Row, entity_rows
 from standoff_sim.composites.backgrounds import Background, find_backgrounds, split_backgrounds
 from standoff_sim.composites.blending import Match, blend
@@ -127,14 +127,14 @@ def record_composites(
 
 
 @contextmanager
-def open_compositor(plan: CompositePlan) -> Generator[Callable[[int], Picture], None, None]:
+def open_compositor(plan: CompositePlan) -> Generator[Callable[[int], LabelledImage], None, None]:
     """Give a function from a picture's index to the picture."""
     splits = split_backgrounds(find_backgrounds(plan.backgrounds), plan.held_out)
     size_px = plan.width_px, plan.height_px
 
     with Renderer(size_px) as renderer:
 
-        def make(index: int) -> Picture:
+        def make(index: int) -> LabelledImage:
             rng = np.random.default_rng([plan.seed, 86028121, index])
             background = _choose(rng, splits[plan.split_of(index, splits)])
             framed = frame(rng, background, size_px)
@@ -144,7 +144,7 @@ def open_compositor(plan: CompositePlan) -> Generator[Callable[[int], Picture], 
             jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, int(rng.choice(_QUALITIES))])[1]
             ignored = [(float(a), float(b), float(c), float(d)) for a, b, c, d in framed.ignored_px]
             name = f"c{plan.seed}-{background.group}-{index:05d}.jpg"
-            return Picture(name, jpeg.tobytes(), size_px, rows, ignored, view=framed.view)
+            return LabelledImage(name, jpeg.tobytes(), size_px, rows, ignored, view=framed.view)
 
         yield make
 

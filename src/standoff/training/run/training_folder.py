@@ -36,7 +36,7 @@ _SHOWN_PICTURES: Final = 6
 
 
 @dataclass(frozen=True, slots=True)
-class RunFolder:
+class TrainingFolder:
     """Paths and writers of one run.
 
     Attributes:

@@ -21,7 +21,7 @@ class _Open:
     is_sure: bool
 
 
-class SaidOfPairs:
+class PairAlarms:
     """Follows the hazards of a run; a hazard belongs to the pair that its tracks showed when last told apart.
 
     Args:

@@ -14,12 +14,12 @@ from standoff.core.errors import DataError
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import FrameResult, GroundMap, IntArray, NoGroundMap, TextArray
 from standoff.evaluation.matching import NOTHING, match_boxes
+from standoff.evaluation.paper.corner_order import CornerOrder
 from standoff.evaluation.paper.mapped_points import MappedPoints, level_feet_px
-from standoff.evaluation.paper.said import SaidOfPairs
+from standoff.evaluation.paper.monitor_setup import MonitorSetup, build_monitor, settings_for
+from standoff.evaluation.paper.pair_alarms import PairAlarms
 from standoff.evaluation.paper.snapshots import Snapshots
-from standoff.evaluation.paper.trial import Trial, build_monitor, settings_for
 from standoff.evaluation.paper.truth_detector import without_reference
-from standoff.evaluation.paper.turning import Turning
 from standoff.evaluation.rectification import FAILURE_PX
 from standoff.monitor import Run
 from standoff.stages.frames import FileSource, open_source
@@ -34,7 +34,7 @@ _ELSEWHERE = "telemetry"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Watched:
+class MonitoredClip:
     """What the monitor said, by frame (F), entity (E) and pair (P) of the clip.
 
     Attributes:
@@ -78,7 +78,7 @@ class Watched:
     snapshots: Snapshots
 
     @classmethod
-    def blank(cls, clip: Clip, size_px: tuple[int, int]) -> Watched:
+    def blank(cls, clip: Clip, size_px: tuple[int, int]) -> MonitoredClip:
         """Return arrays to be filled in."""
         frames, entities = clip.box_px.shape[:2]
         by_pair = frames, len(clip.pairs)
@@ -104,12 +104,12 @@ class Watched:
         )
 
 
-def watch(clip: Clip, trial: Trial, on_frame: Callable[[], None] | None = None) -> Watched:
+def monitor_clip(clip: Clip, setup: MonitorSetup, on_frame: Callable[[], None] | None = None) -> MonitoredClip:
     """Run the monitor on the clip's video.
 
     Args:
         clip: With a reference object.
-        trial: What to try.
+        setup: What to try.
         on_frame: Called after each frame.
 
     Raises:
@@ -117,10 +117,10 @@ def watch(clip: Clip, trial: Trial, on_frame: Callable[[], None] | None = None) 
         StandoffError: The video or the model cannot be used.
     """
     with open_clip_video(clip) as source:
-        monitor = build_monitor(clip, trial, source)
-        reference = settings_for(clip, trial).ground.reference
+        monitor = build_monitor(clip, setup, source)
+        reference = settings_for(clip, setup).ground.reference
         assert reference is not None, "checked in settings_for"
-        notes = Notes(clip, reference.shape(), source.size_px, true_ids=not isinstance(trial.detector, Path))
+        notes = Notes(clip, reference.shape(), source.size_px, true_ids=not isinstance(setup.detector, Path))
         with closing(iter(Run(source, monitor))) as results:
             for result in results:
                 check_frame(clip, result.frame.index)
@@ -128,7 +128,7 @@ def watch(clip: Clip, trial: Trial, on_frame: Callable[[], None] | None = None) 
                 if on_frame is not None:
                     on_frame()
     check_frame(clip, clip.frame_count - 1, seen=notes.taken)
-    return notes.watched
+    return notes.monitored
 
 
 def open_clip_video(clip: Clip) -> FileSource:
@@ -172,16 +172,16 @@ class Notes:
     """
 
     def __init__(self, clip: Clip, shape: ReferenceShape, size_px: tuple[int, int], *, true_ids: bool) -> None:
-        assert clip.reference is not None, "only such clips are watched"
-        self.watched = Watched.blank(clip, size_px)
+        assert clip.reference is not None, "only such clips are monitored"
+        self.monitored = MonitoredClip.blank(clip, size_px)
         self.taken = 0
         self._clip, self._true_px = clip, clip.reference.corners_px
         self._level_px = level_feet_px(clip)
         self._in_picture = clip.reference.inside(size_px)
         self._turn = 0
-        self._turning = Turning(shape, clip.reference.corners_m)
+        self._turning = CornerOrder(shape, clip.reference.corners_m)
         self._true_ids = true_ids
-        self._said = SaidOfPairs(clip.pairs)
+        self._said = PairAlarms(clip.pairs)
 
     def take(self, result: FrameResult) -> IntArray:
         """File a frame.
@@ -189,10 +189,10 @@ class Notes:
         Returns:
             (E,) row of each entity's track among the result's tracks, or NOTHING.
         """
-        frame, watched = result.frame.index, self.watched
+        frame, monitored = result.frame.index, self.monitored
         self.taken += 1
-        watched.time_s[frame] = result.frame.time_s
-        watched.ground_s[frame] = result.stage_ms["ground"] / 1e3
+        monitored.time_s[frame] = result.frame.time_s
+        monitored.ground_s[frame] = result.stage_ms["ground"] / 1e3
         turn = self._take_map(result)
         tracks, detections = result.tracks, without_reference(result.detections)
         if self._true_ids:
@@ -202,50 +202,50 @@ class Notes:
             track_row = match_boxes(true_px, true_class, tracks.xyxy_px, tracks.class_id)
             detection_row = match_boxes(true_px, true_class, detections.xyxy_px, detections.class_id)
         detected, tracked = detection_row != NOTHING, track_row != NOTHING
-        watched.detected_px[frame, detected] = detections.xyxy_px[detection_row[detected]]
-        if watched.no_map[frame] == NOT_BY_REFERENCE:
+        monitored.detected_px[frame, detected] = detections.xyxy_px[detection_row[detected]]
+        if monitored.no_map[frame] == NOT_BY_REFERENCE:
             # Distances count, places are counted from somewhere else.
-            watched.reason[frame, tracked] = NOT_BY_REFERENCE
+            monitored.reason[frame, tracked] = NOT_BY_REFERENCE
         else:
             xy_m = self._turning.to_site(result.positions.xy_m[track_row[tracked]], turn)
-            watched.xy_m[frame, tracked] = xy_m
-            watched.reason[frame, tracked] = result.positions.reason[track_row[tracked]]
-        watched.reason[frame, ~tracked] = NOT_DETECTED
-        watched.reason[frame, np.isnan(self._clip.box_px[frame]).any(axis=1)] = NOT_VISIBLE
+            monitored.xy_m[frame, tracked] = xy_m
+            monitored.reason[frame, tracked] = result.positions.reason[track_row[tracked]]
+        monitored.reason[frame, ~tracked] = NOT_DETECTED
+        monitored.reason[frame, np.isnan(self._clip.box_px[frame]).any(axis=1)] = NOT_VISIBLE
         self._take_distances(result, track_row)
         entity_of = dict(
             zip(tracks.track_id[track_row[tracked]].tolist(), np.flatnonzero(tracked).tolist(), strict=True)
         )
-        watched.said[frame], watched.alarmed[frame] = self._said.take(result.hazards, entity_of)
+        monitored.said[frame], monitored.alarmed[frame] = self._said.take(result.hazards, entity_of)
         return track_row
 
     def _take_map(self, result: FrameResult) -> int:
         """File what is known of the map; return the turn that brings its positions to the site frame."""
-        frame, ground, watched = result.frame.index, result.ground, self.watched
+        frame, ground, monitored = result.frame.index, result.ground, self.monitored
         true_px = self._true_px[frame]
         if isinstance(ground, NoGroundMap) or ground.method == _ELSEWHERE:
-            watched.no_map[frame] = NOT_BY_REFERENCE if isinstance(ground, GroundMap) else ground.reason
-            watched.snapshots.take_failure(result.frame, true_px, None, str(watched.no_map[frame]))
+            monitored.no_map[frame] = NOT_BY_REFERENCE if isinstance(ground, GroundMap) else ground.reason
+            monitored.snapshots.take_failure(result.frame, true_px, None, str(monitored.no_map[frame]))
             return 0
         error_px, turn = np.full(4, np.nan), self._turn
         if len(ground.anchors_px) == len(true_px) and np.isfinite(true_px).all():
             error_px, turn = self._turning.compare(ground.anchors_px, true_px)
         self._turn = turn
-        watched.corner_error_px[frame] = error_px
-        watched.carried[frame] = ground.age_s > 0.0 and not self._in_picture[frame]
-        watched.scale_m_per_px[frame] = ground.scale_m_per_px
+        monitored.corner_error_px[frame] = error_px
+        monitored.carried[frame] = ground.age_s > 0.0 and not self._in_picture[frame]
+        monitored.scale_m_per_px[frame] = ground.scale_m_per_px
         boxes_px = self._clip.box_px[frame]
         centres_px = (boxes_px[:, :2] + boxes_px[:, 2:]) / 2.0
-        watched.annotated_m[frame] = self._turning.to_site(ground.to_ground(centres_px)[0], turn)
+        monitored.annotated_m[frame] = self._turning.to_site(ground.to_ground(centres_px)[0], turn)
         visible = np.isfinite(boxes_px).all(axis=1)
-        for points, points_px in ((watched.true_feet, self._clip.foot_px), (watched.level_feet, self._level_px)):
+        for points, points_px in ((monitored.true_feet, self._clip.foot_px), (monitored.level_feet, self._level_px)):
             points.take(frame, np.where(visible[:, None], points_px[frame], np.nan), ground, self._turning, turn)
-        if watched.carried[frame]:
+        if monitored.carried[frame]:
             return turn
         if is_wrong(error_px):
-            watched.snapshots.take_failure(result.frame, true_px, ground, WRONG)
+            monitored.snapshots.take_failure(result.frame, true_px, ground, WRONG)
         else:
-            watched.snapshots.take(result.frame, true_px, ground)
+            monitored.snapshots.take(result.frame, true_px, ground)
         return turn
 
     def _take_distances(self, result: FrameResult, track_row: IntArray) -> None:
@@ -255,8 +255,8 @@ class Notes:
             if (track_row[ends] != NOTHING).all():
                 first, second = sorted(result.tracks.track_id[track_row[ends]].tolist())
                 if (row := rows.get((first, second))) is not None:
-                    self.watched.distance_m[result.frame.index, column] = near.distance_m[row]
-                    self.watched.sigma_m[result.frame.index, column] = near.sigma_m[row]
+                    self.monitored.distance_m[result.frame.index, column] = near.distance_m[row]
+                    self.monitored.sigma_m[result.frame.index, column] = near.sigma_m[row]
 
     def _rows_by_id(self, track_id: IntArray) -> IntArray:
         """Return (E,) the row of each entity under its own id, or -1."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from standoff.core.durations import has_lasted
 from standoff.core.types import Hazard, Severity
-from standoff.stages.hazard.life import UNMEASURED, LastPhase, Latch, OpenHazard, Reading
+from standoff.stages.hazard.latch import UNMEASURED, LastPhase, Latch, OpenHazard, Reading
 from standoff.stages.hazard.params import HazardParams
 
 
@@ -24,7 +24,7 @@ class Limit:
     clear: bool
 
 
-class Watch:
+class HazardLifeCycle:
     """One life after another of the hazard of one thing. In each frame call exactly one of its four methods.
 
     Two latches follow what is measured, one per limit: near and breached. A hazard is open while one of them is on;

@@ -14,7 +14,7 @@ from standoff.core.homography import FloatArray
 from standoff.core.pose import CHANGES
 from standoff.core.types import CameraMotion, Detections, Frame, GroundMap, NoCameraMotion, NoGroundMap
 from standoff.stages.ground.basis import HELP, BasisTally
-from standoff.stages.ground.camera_belief import STATED, CameraBelief, Moment
+from standoff.stages.ground.camera_belief import STATED, CameraBelief, FrameEvidence
 from standoff.stages.ground.last_resorts import LastResorts
 from standoff.stages.ground.marker_observer import MarkerObserver
 from standoff.stages.ground.params import FusedParams
@@ -27,7 +27,7 @@ from standoff.stages.ground.reference import rectified_scale_m_per_px
 from standoff.stages.ground.reference_landmarks import ReferenceLandmarks
 from standoff.stages.ground.solid_observer import Reference, SolidObserver
 from standoff.stages.ground.survey_observer import SurveyObserver
-from standoff.stages.ground.surveyed import SurveyedGround
+from standoff.stages.ground.surveyed_ground import SurveyedGround
 
 NOT_SURE = "lengths on the ground are not sure enough"
 UNSURE = "the reference has been out of sight too long"
@@ -189,28 +189,28 @@ class FusedGround(protocols.Ground):
             GroundError: A box or the camera does not fit the pictures.
         """
         self.prepare(frame.size_px)
-        belief, moment = self._belief, Moment(frame, detections, motion)
+        belief, evidence = self._belief, FrameEvidence(frame, detections, motion)
         if not self._remember:
             belief.restart()
-        belief.predict(moment)
+        belief.predict(evidence)
         reasons = []
         if self._survey_points is not None:
-            reasons.append(self._look_at(self._survey_points, moment))
-        reasons += self._references.look(moment, belief)
+            reasons.append(self._look_at(self._survey_points, evidence))
+        reasons += self._references.look(evidence, belief)
         if self._marker_points is not None:
-            reasons.append(self._look_at(self._marker_points, moment))
-        if not (belief.by_landmark and moment.held and self._sure):
-            reasons += self._last_resorts.ask(moment, belief)
+            reasons.append(self._look_at(self._marker_points, evidence))
+        if not (belief.by_landmark and evidence.held and self._sure):
+            reasons += self._last_resorts.ask(evidence, belief)
             self._tally.most_people = self._last_resorts.most_people
-        result = self._map(moment) if moment.held else self._no_map(reasons)
+        result = self._map(evidence) if evidence.held else self._no_map(reasons)
         if isinstance(result, NoGroundMap):
             self._tally.why_none = result.reason
         return result
 
-    def _look_at(self, points: PointLandmarks, moment: Moment) -> str:
+    def _look_at(self, points: PointLandmarks, evidence: FrameEvidence) -> str:
         """Take in points that are seen; return why none was taken in, or ""."""
         site_frame = self._belief.site_frame
-        reason = points.look(moment, self._belief)
+        reason = points.look(evidence, self._belief)
         if self._belief.site_frame != site_frame:
             self._references.forget_places()
         return reason
@@ -232,7 +232,7 @@ class FusedGround(protocols.Ground):
         scale_sigma = float(np.sqrt(now.total[5, 5])) / max(float(now.state.view.position_m[2]), 1e-3)
         return scale_sigma <= keeper.reference.params.max_scale_sigma
 
-    def _map(self, moment: Moment) -> GroundMap | NoGroundMap:
+    def _map(self, evidence: FrameEvidence) -> GroundMap | NoGroundMap:
         belief, keeper = self._belief, self._keeper
         now, source = belief.now, belief.source
         assert now is not None and source is not None
@@ -245,8 +245,8 @@ class FusedGround(protocols.Ground):
             now.total[:CHANGES, :CHANGES],
             method=self._method if keeper is not None else source,
             scale_m_per_px=_scale_m_per_px(now, keeper),
-            anchors_px=_anchors_px(moment, now, keeper),
-            age_s=max(moment.frame.time_s - belief.observed_s, 0.0),
+            anchors_px=_anchors_px(evidence, now, keeper),
+            age_s=max(evidence.frame.time_s - belief.observed_s, 0.0),
             size_sigma=size_sigma,
             middle_m=middle_m,
             site_frame=belief.site_frame,
@@ -263,12 +263,12 @@ class FusedGround(protocols.Ground):
         return 0.0, None
 
 
-def _anchors_px(moment: Moment, now: Estimate, keeper: SolidObserver | None) -> FloatArray:
+def _anchors_px(evidence: FrameEvidence, now: Estimate, keeper: SolidObserver | None) -> FloatArray:
     """Return (A, 2) what was seen to measure by, or where the reference should be that is hidden."""
-    if keeper is not None and not moment.anchors_px:
+    if keeper is not None and not evidence.anchors_px:
         hidden_px = keeper.outline_px(now.state)
         return hidden_px if np.isfinite(hidden_px).all() else np.zeros((0, 2))
-    return np.concatenate([np.zeros((0, 2)), *moment.anchors_px])
+    return np.concatenate([np.zeros((0, 2)), *evidence.anchors_px])
 
 
 def _scale_m_per_px(now: Estimate, keeper: SolidObserver | None) -> float:

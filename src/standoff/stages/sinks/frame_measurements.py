@@ -35,7 +35,7 @@ ASSISTANCE = "Assistance only: no certified safety function, no replacement for 
 
 
 @dataclass(frozen=True, slots=True)
-class Scene:
+class FrameMeasurements:
     """One frame's measurements.
 
     Attributes:
@@ -74,7 +74,7 @@ class Scene:
         result: FrameResult,
         zones: tuple[Zone, ...] = (),
         hidden_px: FloatArray | None = None,
-    ) -> Scene:
+    ) -> FrameMeasurements:
         """Keep what is drawn of a result; the frame's pixels are let go."""
         return cls(
             frame_index=result.frame.index,

@@ -1,4 +1,4 @@
-"""Write down what is true in any frame of a site, without its picture."""
+"""What is true in any frame of a site, without its picture."""
 
 from __future__ import annotations
 
@@ -6,23 +6,23 @@ import numpy as np
 
 from standoff_sim.clip.truth import FrameTruth, entity_row, frame_row, pair_rows
 from standoff_sim.scene.moment import scene_at
-from standoff_sim.scene.sights import Outlines
+from standoff_sim.scene.occlusion import Outlines
 from standoff_sim.scene.site import Site
 
 
-class Surveyor:
+class SiteTruth:
     """The counterpart of `Studio` that draws nothing.
 
     Args:
-        site: To survey.
+        site: Whose truth is asked for.
     """
 
     def __init__(self, site: Site) -> None:
         self._site = site
         self._outlines = Outlines(site.scene)
 
-    def survey(self, index: int, time_s: float) -> FrameTruth:
-        """Return the rows of one frame; what shows is approximated as `standoff_sim.scene.sights` says.
+    def at(self, index: int, time_s: float) -> FrameTruth:
+        """Return the rows of one frame; what shows is approximated as `standoff_sim.scene.occlusion` says.
 
         Args:
             index: Of the frame.

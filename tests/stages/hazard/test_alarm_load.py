@@ -7,7 +7,7 @@ import pytest
 from stages.hazard.test_monitor import frame
 
 from standoff.core.types import GroundPositions, Hazard
-from standoff.stages.hazard.load import AlarmLoad
+from standoff.stages.hazard.alarm_load import AlarmLoad
 
 
 def said(number: int, *, ahead: float = 0.4, severity: str = "warning", rule: str = "proximity") -> Hazard:

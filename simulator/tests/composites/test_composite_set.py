@@ -12,7 +12,7 @@ import yaml
 
 from standoff.core.classes import CLASSES
 from standoff.core.errors import ConfigError
-from standoff_sim.composites.recording import CompositePlan, record_composites
+from standoff_sim.composites.composite_set import CompositePlan, record_composites
 
 _SIZE_PX = (320, 180)
 _FLIGHTS = ("field", "park", "yard")

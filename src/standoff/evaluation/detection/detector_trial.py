@@ -29,7 +29,7 @@ _WARM_UP = 3
 
 
 @dataclass(frozen=True, slots=True)
-class Candidate:
+class DetectorSetup:
     """A model and how it is used.
 
     Attributes:
@@ -70,7 +70,7 @@ class TrialResult:
         unseen: Scored classes that have truth and that the model does not know: their AP is 0.
     """
 
-    candidate: Candidate
+    candidate: DetectorSetup
     model: Mapping[str, Any]
     score: DetectionScore
     coco: CocoFigures
@@ -155,7 +155,7 @@ def require_truth(material: Material, grouping: Grouping) -> None:
 
 
 def try_candidate(
-    candidate: Candidate,
+    candidate: DetectorSetup,
     detector: OnnxDetector,
     material: Material,
     grouping: Grouping,
@@ -166,7 +166,7 @@ def try_candidate(
 
     Args:
         candidate: Which.
-        detector: From `Candidate.open`.
+        detector: From `DetectorSetup.open`.
         material: Pictures and what is in them.
         grouping: Which classes are scored, and as what.
         iou: Least intersection over union of a right detection; COCO's figures have their own.

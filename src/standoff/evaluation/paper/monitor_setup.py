@@ -25,7 +25,7 @@ HeightKnowledge = Literal["known", "unknown"]
 
 
 @dataclass(frozen=True, slots=True)
-class Trial:
+class MonitorSetup:
     """What is tried.
 
     Attributes:
@@ -88,28 +88,28 @@ class Trial:
         return about
 
 
-def build_monitor(clip: Clip, trial: Trial, source: FileSource) -> Monitor:
+def build_monitor(clip: Clip, setup: MonitorSetup, source: FileSource) -> Monitor:
     """Make the monitor for one clip.
 
     Args:
-        clip: The truth, of which the monitor is shown the reference's shape and what the trial says.
-        trial: What to try.
+        clip: The truth, of which the monitor is shown the reference's shape and what the setup says.
+        setup: What to try.
         source: The clip's video.
 
     Raises:
         DataError: There is no reference object.
         StandoffError: The model or the recorded detections cannot be used, or the clip's own files are broken.
     """
-    settings = settings_for(clip, trial)
+    settings = settings_for(clip, setup)
     detector: Detector
     tracker: Tracker
-    if isinstance(trial.detector, Path):
+    if isinstance(setup.detector, Path):
         detector, tracker = build_stage("detect", settings), build_stage("track", settings)
-        _check_reference_class(detector, trial.detector)
+        _check_reference_class(detector, setup.detector)
         if isinstance(detector, RecordedDetector):
             detector.check_source(source.description)
     else:
-        detector = tracker = TrueBoxes(clip, trial.box_error if trial.detector == "noisy" else None, trial.seed)
+        detector = tracker = TrueBoxes(clip, setup.box_error if setup.detector == "noisy" else None, setup.seed)
     ground = build_stage("ground", settings, source.camera_prior)
     return Monitor(
         detector=detector,
@@ -124,8 +124,8 @@ def build_monitor(clip: Clip, trial: Trial, source: FileSource) -> Monitor:
     )
 
 
-def settings_for(clip: Clip, trial: Trial) -> Settings:
-    """Return the settings: the clip's own description of its reference, and what the trial changes.
+def settings_for(clip: Clip, setup: MonitorSetup) -> Settings:
+    """Return the settings: the clip's own description of its reference, and what the setup changes.
 
     Raises:
         DataError: There is no reference object.
@@ -137,18 +137,18 @@ def settings_for(clip: Clip, trial: Trial) -> Settings:
         )
     # The detector says where the reference is, nobody but the clip which of its corners is the first.
     place = {"box_px": None, "box_time_s": None, "first_corner_px": _first_corner_px(clip, clip.reference)}
-    height = {} if trial.height == "known" else {"height_m": None}
+    height = {} if setup.height == "known" else {"height_m": None}
     ground: dict[str, Any] = {
-        "reference": {"params": {"method": trial.method}, **place, **height},
-        "camera": str(clip.camera_file) if trial.knows_lens else None,
+        "reference": {"params": {"method": setup.method}, **place, **height},
+        "camera": str(clip.camera_file) if setup.knows_lens else None,
     }
     overrides: dict[str, Any] = {
         "ground": ground,
-        "locate": {"anchor": trial.anchor_used, "smooth": trial.method != "paper"},
-        "proximity": {"outlier_filter": trial.outlier_filter},
+        "locate": {"anchor": setup.anchor_used, "smooth": setup.method != "paper"},
+        "proximity": {"outlier_filter": setup.outlier_filter},
     }
-    if isinstance(trial.detector, Path):
-        overrides["detections" if is_recording(trial.detector) else "model"] = str(trial.detector)
+    if isinstance(setup.detector, Path):
+        overrides["detections" if is_recording(setup.detector) else "model"] = str(setup.detector)
     return load_settings(clip.settings_file, overrides)
 
 

@@ -16,7 +16,7 @@ from standoff.core.errors import OutputError
 from standoff.stages.frames import open_source
 from standoff.stages.ground import load_camera
 from standoff_sim.clip.presets import Plan, plan_clip
-from standoff_sim.clip.record import frame_times_s, record_clip
+from standoff_sim.clip.write_clip import frame_times_s, record_clip
 
 _FRAMES = 3
 _FILES = {

@@ -6,7 +6,7 @@ import pytest
 
 from standoff.core.homography import FloatArray
 from standoff.core.types import ImageArray
-from standoff.stages.ground.follow import BoxFollower, moved_box
+from standoff.stages.ground.box_follower import BoxFollower, moved_box
 
 ROUGH = (
     cv2.GaussianBlur(np.random.default_rng(2).normal(120.0, 300.0, (400, 500)), (0, 0), 3.0)
