@@ -74,9 +74,9 @@ PUBLIC_NAMES = {
     "standoff.stages.motion": {"MotionEstimator", "MotionParams"},
     "standoff.stages.proximity": {"Excuses", "ProximityMeter", "ProximityParams", "side_classes"},
     "standoff.stages.sinks": {
-        "Composer", "DETECTIONS", "DrawParams", "FRAMES", "HazardSink", "PROXIMITY", "ReportParams", "ReportSink",
-        "FrameMeasurements", "ShowParams", "TRACKS", "Table", "TableParams", "TableSink", "VideoParams", "VideoSink", "Wanted",
-        "ZONED_TRACKS", "detections_table", "make_sink", "percent_text", "prepare_output",
+        "Composer", "DETECTIONS", "DrawParams", "FRAMES", "FrameMeasurements", "HazardSink", "PROXIMITY",
+        "ReportParams", "ReportSink", "ShowParams", "TRACKS", "Table", "TableParams", "TableSink", "VideoParams",
+        "VideoSink", "Wanted", "ZONED_TRACKS", "detections_table", "make_sink", "percent_text", "prepare_output",
     },
     "standoff.stages.track": {"TrackParams", "Tracker"},
     "standoff.stages.watched": {"GroundWatcher", "WatchedParams"},

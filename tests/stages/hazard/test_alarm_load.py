@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from stages.hazard.test_monitor import frame
+from stages.hazard.frames_of_gaps import frame
 
 from standoff.core.types import GroundPositions, Hazard
 from standoff.stages.hazard.alarm_load import AlarmLoad

@@ -1,9 +1,9 @@
 """The paper's tests on clips with exact truth: every figure of the paper beside what this monitor measures.
 
 from standoff.clips import load_clip
-from standoff.evaluation.paper import Trial, evaluate_clip
+from standoff.evaluation.paper import MonitorSetup, evaluate_clip
 
-for figure in evaluate_clip(load_clip("clips/mobile"), Trial(method="oriented")).figures():
+for figure in evaluate_clip(load_clip("clips/mobile"), MonitorSetup(method="oriented")).figures():
     print(figure.label, figure.paper, figure.measured, figure.unit)
 """
 
