@@ -10,6 +10,7 @@ import numpy as np
 
 from standoff.core import homography, protocols
 from standoff.core.camera import CameraPrior
+from standoff.core.errors import GroundError
 from standoff.core.homography import FloatArray
 from standoff.core.pose import CHANGES
 from standoff.core.types import CameraMotion, Detections, Frame, GroundMap, NoCameraMotion, NoGroundMap
@@ -22,7 +23,6 @@ from standoff.stages.ground.plane_frame import LEVEL_DEG, laid_marker, laid_refe
 from standoff.stages.ground.point_landmarks import PointLandmarks
 from standoff.stages.ground.pose_filter import Estimate
 from standoff.stages.ground.pose_map import map_from_view, middle_scale_m_per_px
-from standoff.stages.ground.prior_for import prior_for
 from standoff.stages.ground.reference import rectified_scale_m_per_px
 from standoff.stages.ground.reference_landmarks import ReferenceLandmarks
 from standoff.stages.ground.solid_observer import Reference, SolidObserver
@@ -167,7 +167,7 @@ class FusedGround(protocols.Ground):
             reference.place.check_size(size_px)
         if self._survey is not None:
             self._survey.survey.prepare(size_px)
-        camera = prior_for(self._given_camera, size_px)
+        camera = _prior_for(self._given_camera, size_px)
         self._forget_pictures()
         self._camera, self._size_px = camera, size_px
         self._begin_stream(camera)
@@ -282,3 +282,19 @@ def _scale_m_per_px(now: Estimate, keeper: SolidObserver | None) -> float:
     middle_px = np.array([[view.camera.width_px / 2.0, view.camera.height_px / 2.0]])
     jacobian = homography.point_jacobian(homography.invert(view.plane_to_pinhole()), middle_px)[0]
     return float(np.sqrt(abs(np.linalg.det(jacobian))))
+
+
+def _prior_for(given: CameraPrior | None, size_px: tuple[int, int]) -> CameraPrior:
+    """Return what is known of the camera for pictures of a size (width, height); None given: a drone's usual lens.
+
+    Raises:
+        GroundError: The camera is known for pictures of another shape.
+    """
+    try:
+        return CameraPrior.unknown(*size_px) if given is None else given.scaled_to(*size_px)
+    except ValueError as error:
+        raise GroundError(
+            expected="pictures of the shape that the camera was calibrated for",
+            found=str(error),
+            fix="calibrate with pictures from the same camera mode as the video",
+        ) from error

@@ -31,7 +31,7 @@ PointObserver = Callable[[FrameEvidence, View | None], Sequence[PointObservation
 """From a frame, and where the camera is about, to what is seen in it, or why nothing is."""
 
 _TAPE_SIGMA_M = 0.02
-"""Of where a marker lies beside other things. A single one says where the site frame is."""
+"""Where a marker lies beside other things is known to so much; a single one says where the site frame is."""
 
 
 @dataclass(frozen=True, slots=True)

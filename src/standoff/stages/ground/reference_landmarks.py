@@ -28,7 +28,7 @@ _DOUBTED_S = 2.0
 """For so long a reference that telemetry contradicts is not believed: what hides a part of it soon hides another."""
 
 _MOST_LENS_DOUBTS = 2
-"""Each costs a search."""
+"""So often at most the lens is doubted, because each doubt costs a search."""
 
 _MOVED_M, _MOVED_SIGMAS = 0.15, 4.0
 """A reference that is seen so far from where it stood has been moved."""

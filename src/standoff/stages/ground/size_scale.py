@@ -30,7 +30,7 @@ _OTHER_FILL = 0.9
 """A machine's box is smaller than its block's: corners are rounded off, and a boom is seldom stretched out."""
 
 _ENTITY_SIGMA = {Role.PERSON: 0.10, Role.EQUIPMENT: 0.20}
-"""Of one entity against its class: posture and stature; heading and kind."""
+"""Standard error of the log size of one entity against its class: by posture and stature, or by heading and kind."""
 
 _LOOSE_PX = 1.5
 """How many pixels too large or too small a detector's boxes are."""

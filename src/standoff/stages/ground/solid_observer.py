@@ -29,7 +29,7 @@ from standoff.stages.ground.solid_search import HeightPrior, search_solid
 _LEAST_REACH_PX, _MOST_REACH_PX = 5.0, 8.0
 _REACH_SIGMAS = 4.0
 _MIN_SUPPORT = 0.4
-"""Of the outline that should show, so much must be seen for the reference to count as seen in a frame."""
+"""So much of the outline that should show must be seen for the reference to count as seen in a frame."""
 
 _GATE_PX, _GATE_SIGMAS = 1.0, 4.0
 _SEARCH_AGAIN_S, _LOOK_ELSEWHERE_S = 0.19, 1.0
@@ -40,7 +40,7 @@ _MAX_REFUSED_S = 1.0
 """When a reference that can be seen has contradicted what is predicted for so long, it is searched for again."""
 
 _LEAST_FILLED = 0.65
-"""Of a detector's box, what is found in it covers so much, or it is something else in the box."""
+"""What is found in a detector's box covers so much of it, or it is something else in the box."""
 
 _MOST_ELSEWHERE = 0.5
 """Of a detector's box, so much at most may lie beside where the reference is believed to be: its sides do."""

@@ -14,7 +14,7 @@ from standoff.core.types import GroundPositions, Hazard
 
 MOST_PER_HOUR = 6.0
 _LEAST_HOURS = 0.25
-"""Of workers in sight; of less nobody can tell a rate."""
+"""Workers must have been in sight for so long, taken together; of less nobody can tell a rate."""
 
 _LONGEST_STEP_S = 5.0
 """A pause in a stream is no work that was watched."""

@@ -26,7 +26,7 @@ from standoff.core.zones import Zone
 from standoff.drawing.palette import Tone, class_tone
 
 _WELL_WATCHED = 0.9
-"""From this share on nothing is said of the circle about a machine."""
+"""Where this share of the circle about a machine is watched, nothing is said of it."""
 _WORTH_SAYING = 0.05
 _MOST_REASONS = 2
 
