@@ -18,6 +18,7 @@ READY := $(VENV)/.ready
 SHARED ?= ../shared/data
 YOLO := $(SHARED)/weights/yolo-fastest-1.1-xl/yolo-fastest-1.1-xl
 WORKERS ?= 2
+ALL_TESTS := tests simulator/tests
 # The packages that run on site, and the tests that are theirs.
 COUNTED := tests/core tests/files tests/stages tests/monitor src/standoff/core src/standoff/files src/standoff/stages src/standoff/monitor
 
@@ -65,14 +66,14 @@ compiled: $(READY)
 
 # pytest leaves with 5 where nothing is marked, and only then is that no failure.
 test-live: $(READY)
-	@code=0; OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest tests -n $(WORKERS) --dist worksteal -m live || code=$$?; \
+	@code=0; OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest $(ALL_TESTS) -n $(WORKERS) --dist worksteal -m live || code=$$?; \
 	if [ $$code = 5 ]; then echo "No test is marked live."; else exit $$code; fi
 
 test-processors: $(READY)
 	$(BIN)/python tests/other_processors.py $(TESTS)
 
 fuzz: $(READY)
-	$(BIN)/python -m pytest $(or $(TESTS),tests) -n $(WORKERS) -m "hypothesis and not live" --hypothesis-profile=fuzz
+	$(BIN)/python -m pytest $(or $(TESTS),$(ALL_TESTS)) -n $(WORKERS) -m "hypothesis and not live" --hypothesis-profile=fuzz
 
 lint: $(READY)
 	$(BIN)/ruff check .

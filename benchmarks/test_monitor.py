@@ -22,7 +22,7 @@ from standoff.core import homography, protocols
 from standoff.core.camera import Camera
 from standoff.core.protocols import AnyGround, AnyMotion
 from standoff.core.types import Detections, Frame, GroundMap, Tracks
-from standoff.evaluation.bench_workload import Site, SiteFilm, workload_sinks
+from standoff.evaluation.bench_workload import BenchSite, SiteFilm, workload_sinks
 from standoff.monitor import Monitor, Run
 from standoff.stages.hazard import HazardMonitor
 from standoff.stages.locate import Locator
@@ -92,7 +92,7 @@ class KnownBefore(protocols.Source, protocols.Detector):
         frames: How many.
     """
 
-    def __init__(self, site: Site, frames: int) -> None:
+    def __init__(self, site: BenchSite, frames: int) -> None:
         self._site, self._frames = site, list(SiteFilm(site, frames).frames())
         self._detections: list[Detections] = [site.detections(frame.index) for frame in self._frames]
         motion, ground = MotionEstimator(), site.ground("surveyed")
@@ -146,7 +146,7 @@ class Mapped(protocols.Ground):
 def test_own_work_of_a_frame(benchmark: BenchmarkFixture, tmp_path: Path, film: bool) -> None:
     benchmark.group = "own work"
     cv2.setNumThreads(1)
-    known = KnownBefore(Site(SIZE_PX, 10), OWN_WORK_FRAMES)
+    known = KnownBefore(BenchSite(SIZE_PX, 10), OWN_WORK_FRAMES)
     monitor = Monitor(
         detector=known,
         motion=Moving(known),
@@ -166,5 +166,5 @@ def test_own_work_of_a_frame(benchmark: BenchmarkFixture, tmp_path: Path, film: 
 def test_baseline_halving_the_picture_with_opencv(benchmark: BenchmarkFixture) -> None:
     benchmark.group = "own work"
     cv2.setNumThreads(1)
-    picture = Site(SIZE_PX, 10).picture()
+    picture = BenchSite(SIZE_PX, 10).picture()
     assert benchmark(lambda: cv2.resize(picture, (960, 540), interpolation=cv2.INTER_AREA)).shape == (540, 960, 3)

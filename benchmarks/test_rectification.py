@@ -7,11 +7,11 @@ from typing import Any
 
 import pytest
 
-from standoff.evaluation.drawn_quadrilaterals import draw_scene
+from standoff.evaluation.drawn_quadrilaterals import draw_quadrilateral
 from standoff.evaluation.rectification import METHODS, paper_edges, ransac_by_loop
 from standoff.stages.ground import OutlineFinder, ReferenceMethod, ReferenceParams, ransac_contours, sample_pairs
 
-SCENE = draw_scene("sand", 0)
+SCENE = draw_quadrilateral("sand", 0)
 
 
 @pytest.mark.benchmark(group="outline")

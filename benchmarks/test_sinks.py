@@ -15,7 +15,16 @@ from stages.sinks.fake_site import FakeSite
 from standoff.core.protocols import Sink
 from standoff.core.types import FrameResult, ImageArray, Outcome
 from standoff.drawing.encoder import VideoFile
-from standoff.stages.sinks import FRAMES, PROXIMITY, TRACKS, Composer, HazardSink, ReportSink, Scene, TableSink
+from standoff.stages.sinks import (
+    FRAMES,
+    PROXIMITY,
+    TRACKS,
+    Composer,
+    FrameMeasurements,
+    HazardSink,
+    ReportSink,
+    TableSink,
+)
 
 SIZE = (1920, 1080)
 _Item = TypeVar("_Item")
@@ -36,11 +45,11 @@ def _each(items: list[_Item], action: Callable[[_Item], object]) -> Callable[[],
 
 
 def _composing(composer: Composer, results: list[FrameResult]) -> Callable[[], None]:
-    scenes: list[tuple[ImageArray, Scene]] = []
+    measured_frames: list[tuple[ImageArray, FrameMeasurements]] = []
     for result in results:
         picture = result.frame.picture.resized_bgr(*composer.picture_size_px)
-        scenes.append((picture, Scene.of(result)))
-    return _each(scenes, lambda item: composer.compose(*item))
+        measured_frames.append((picture, FrameMeasurements.of(result)))
+    return _each(measured_frames, lambda item: composer.compose(*item))
 
 
 def test_composing_the_annotated_picture(benchmark: BenchmarkFixture, results: list[FrameResult]) -> None:
@@ -59,7 +68,9 @@ def test_baseline_encoding_the_composed_picture(
     benchmark: BenchmarkFixture, tmp_path: Path, results: list[FrameResult]
 ) -> None:
     composer, time_s = Composer(SIZE), itertools.count(0.0, 0.04)
-    picture = composer.compose(results[0].frame.picture.resized_bgr(*composer.picture_size_px), Scene.of(results[0]))
+    picture = composer.compose(
+        results[0].frame.picture.resized_bgr(*composer.picture_size_px), FrameMeasurements.of(results[0])
+    )
     file = VideoFile(tmp_path / "annotated.mp4", composer.size_px, crf=23, preset="superfast")
     benchmark(lambda: file.write(picture, next(time_s)))
     file.close()

@@ -14,7 +14,7 @@ from pytest_benchmark.fixture import BenchmarkFixture
 
 from standoff.core.motions import NoCameraMotion
 from standoff.core.types import GroundPositions, Tracks
-from standoff.evaluation.bench_workload import Site, SiteFilm
+from standoff.evaluation.bench_workload import BenchSite, SiteFilm
 from standoff.stages.watched import GroundWatcher, WatchedParams
 
 pytestmark = pytest.mark.benchmark(timer=time.process_time)
@@ -25,7 +25,7 @@ SIZES_PX = {"1080p": (1920, 1080), "4K": (3840, 2160)}
 @pytest.mark.parametrize("size", SIZES_PX)
 def test_judging_a_picture(benchmark: BenchmarkFixture, size: str) -> None:
     cv2.setNumThreads(1)
-    site = Site(SIZES_PX[size], 10)
+    site = BenchSite(SIZES_PX[size], 10)
     frame = next(SiteFilm(site, 1).frames())
     ground = site.ground("surveyed").update(frame, site.detections(0), NoCameraMotion("one picture"))
     watcher = GroundWatcher(WatchedParams(judge_every_s=0.0))

@@ -47,7 +47,7 @@ from standoff.core.types import GroundMap, GroundPositions, Hazard, IntArray, Pr
 from standoff.stages.hazard import HazardMonitor, HazardParams
 from standoff.stages.locate import Locator
 from standoff.stages.proximity import ProximityMeter, ProximityParams
-from standoff_sim.scene.cast import Stage
+from standoff_sim.scene.cast import FilmedArea
 from standoff_sim.scene.casting import CASTS
 
 STEP_S = 0.2
@@ -149,7 +149,7 @@ def _share(those: BoolArray) -> float:
 
 def work(cast: str, seed: int) -> Shift:
     """Let a cast work."""
-    stage = Stage(0.0, 1.0, LASTING_S[cast], None, None)
+    stage = FilmedArea(0.0, 1.0, LASTING_S[cast], None, None)
     actors = CASTS[cast](np.random.default_rng(seed), stage).actors
     times_s = np.arange(0.0, LASTING_S[cast], STEP_S)
     columns = [[np.interp(times_s, a.motion.time_s, a.motion.xy_m[:, k]) for k in (0, 1)] for a in actors]

@@ -14,7 +14,7 @@ from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.homography import FloatArray
 from standoff.core.pose import View
 from standoff.core.types import Detections, Frame, GroundMap, NoCameraMotion
-from standoff.evaluation.drawn_quadrilaterals import DIFFICULTIES, SIZE_PX, Difficulty, draw_scene
+from standoff.evaluation.drawn_quadrilaterals import DIFFICULTIES, SIZE_PX, Difficulty, draw_quadrilateral
 from standoff.stages.frames import ArrayPicture
 from standoff.stages.ground import FusedGround, FusedParams, Reference, ReferenceParams, ReferenceShape
 
@@ -42,7 +42,7 @@ def seen_corners(shape: ReferenceShape, rng: np.random.Generator) -> FloatArray:
 def worst_corner_px(shape: ReferenceShape, difficulty: Difficulty, index: int) -> float | None:
     """Return how far the worst corner is off in one picture; None where there is no map."""
     corners_px = seen_corners(shape, np.random.default_rng([7, index]))
-    scene = draw_scene(difficulty, 7, index, corners_px=corners_px)
+    scene = draw_quadrilateral(difficulty, 7, index, corners_px=corners_px)
     reference = Reference(shape, 0.0, params=ReferenceParams(method="refined"))
     ground = FusedGround(
         [reference], camera=CameraPrior.calibrated(CAMERA), params=FusedParams(sizes=False), remember=False

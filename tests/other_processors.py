@@ -21,7 +21,7 @@ NUMERIC = (
     "tests/evaluation",
     "tests/training/pictures",
     "tests/training/run/test_loss.py",
-    "tests/test_pipeline.py",
+    "tests/monitor",
     "tests/test_drawn_site.py",
 )
 """Whatever computes; what writes files, draws the simulator's pictures or trains for long is left out."""

@@ -77,7 +77,7 @@ def difference_levels(one: FloatArray, other: FloatArray) -> float:
 @pytest.mark.usefixtures("opengl")
 def test_the_film_can_be_rendered_again(film: Clip) -> None:
     from standoff_sim.clip.presets import plan_clip
-    from standoff_sim.clip.record import open_shooter
+    from standoff_sim.clip.write_clip import open_shooter
 
     plan = plan_clip("demo", seed=film.seed)
     with open_source(FILM / "video.mp4") as source:

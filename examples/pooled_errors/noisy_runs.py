@@ -29,7 +29,7 @@ from standoff.stages.sinks import FRAMES, PROXIMITY, ZONED_TRACKS, TableSink
 from standoff.stages.track import Tracker
 from standoff.stages.watched import GroundWatcher
 from standoff_sim.clip.presets import plan_clip
-from standoff_sim.clip.record import record_truth
+from standoff_sim.clip.write_clip import record_truth
 
 _TURN_RAD, _SHIFT_M, _FOCAL = 0.003, 0.1, 0.005
 """Standard errors of the view: some decimetres on the ground, 30 m away."""

@@ -35,7 +35,7 @@ PUBLIC_NAMES = {
     },
     "standoff.evaluation.detection": {"ClassScore", "Curve", "DetectionScore", "score_detections"},
     "standoff.evaluation.paper": {
-        "BoxError", "ClipResult", "PaperFigure", "PooledMap", "Trial", "evaluate_clip", "pool", "write_report",
+        "BoxError", "ClipResult", "MonitorSetup", "PaperFigure", "PooledMap", "evaluate_clip", "pool", "write_report",
     },
     "standoff.evaluation.watched": {
         "Missed", "WatchedResult", "WorkerSamples", "evaluate_watched", "read_worker_samples", "score_watched",
@@ -74,9 +74,9 @@ PUBLIC_NAMES = {
     "standoff.stages.motion": {"MotionEstimator", "MotionParams"},
     "standoff.stages.proximity": {"Excuses", "ProximityMeter", "ProximityParams", "side_classes"},
     "standoff.stages.sinks": {
-        "Composer", "DETECTIONS", "DrawParams", "FRAMES", "HazardSink", "PROXIMITY", "ReportParams", "ReportSink",
-        "Scene", "ShowParams", "TRACKS", "Table", "TableParams", "TableSink", "VideoParams", "VideoSink", "Wanted",
-        "ZONED_TRACKS", "detections_table", "make_sink", "percent_text", "prepare_output",
+        "Composer", "DETECTIONS", "DrawParams", "FRAMES", "FrameMeasurements", "HazardSink", "PROXIMITY",
+        "ReportParams", "ReportSink", "ShowParams", "TRACKS", "Table", "TableParams", "TableSink", "VideoParams",
+        "VideoSink", "Wanted", "ZONED_TRACKS", "detections_table", "make_sink", "percent_text", "prepare_output",
     },
     "standoff.stages.track": {"TrackParams", "Tracker"},
     "standoff.stages.watched": {"GroundWatcher", "WatchedParams"},

@@ -19,7 +19,7 @@ _SETTINGS: dict[str, object] = {
 @pytest.fixture(autouse=True)
 def plain_curves(monkeypatch: pytest.MonkeyPatch) -> None:
     """Draw no curves, which takes half of a short run: the tests of a run look at them."""
-    monkeypatch.setattr("standoff.training.run.folder.draw_curves", lambda rows, classes, path: path.touch())
+    monkeypatch.setattr("standoff.training.run.training_folder.draw_curves", lambda rows, classes, path: path.touch())
 
 
 @pytest.fixture

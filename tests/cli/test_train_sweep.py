@@ -21,8 +21,8 @@ _TOO_MUCH = {"optimizer": "sgd", "learning_rate": 1e30, "clip_norm": 1e30}
 @pytest.fixture(autouse=True)
 def plain_curves(monkeypatch: pytest.MonkeyPatch) -> None:
     """Draw no curves, which takes half of a short run."""
-    monkeypatch.setattr("standoff.training.run.folder.draw_curves", lambda rows, classes, path: path.touch())
-    monkeypatch.setattr("standoff.training.sweep.folder.draw_sweep", lambda results, path: path.touch())
+    monkeypatch.setattr("standoff.training.run.training_folder.draw_curves", lambda rows, classes, path: path.touch())
+    monkeypatch.setattr("standoff.training.sweep.sweep_folder.draw_sweep", lambda results, path: path.touch())
 
 
 @pytest.fixture

@@ -16,7 +16,7 @@ from standoff.core.errors import SourceError
 from standoff.core.types import FrameResult, GroundMap
 from standoff.evaluation.bench import bench_source
 from standoff.evaluation.bench_baselines import decoding_baseline, picture_baselines
-from standoff.evaluation.bench_workload import DrawingSink, Site, SiteFilm, monitor_workload
+from standoff.evaluation.bench_workload import BenchSite, DrawingSink, SiteFilm, monitor_workload
 from standoff.evaluation.timing import Baseline, Spread, StageTimes, collect_times, machine
 from standoff.monitor import Monitor, Run
 from standoff.stages.frames import SourceParams
@@ -31,7 +31,7 @@ from standoff.testing import ScriptedDetector
 SMALL_PX = (480, 270)
 
 
-def run_of(site: Site, kind: Literal["surveyed", "reference"], frames: int = 20) -> Run:
+def run_of(site: BenchSite, kind: Literal["surveyed", "reference"], frames: int = 20) -> Run:
     monitor = Monitor(
         detector=ScriptedDetector({index: site.detections(index) for index in range(frames)}),
         motion=MotionEstimator(),
@@ -75,7 +75,7 @@ def test_a_ratio_above_one_means_that_ours_is_faster() -> None:
 
 
 def test_collecting_stops_the_run_and_leaves_the_warm_up_out() -> None:
-    (result,) = run_of(Site(SMALL_PX, 4), "surveyed", frames=1)
+    (result,) = run_of(BenchSite(SMALL_PX, 4), "surveyed", frames=1)
     stopped = []
 
     def endless() -> Iterator[FrameResult]:
@@ -97,7 +97,7 @@ def test_collecting_stops_the_run_and_leaves_the_warm_up_out() -> None:
 def test_the_made_up_site_is_measured_as_it_is(
     kind: Literal["surveyed", "reference"], size_px: tuple[int, int]
 ) -> None:
-    site = Site(size_px, 10)
+    site = BenchSite(size_px, 10)
     *_, last = run_of(site, kind)
     assert isinstance(last.ground, GroundMap)
     moving = last.positions.class_id != 6

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from laws import examples
 
-from standoff.evaluation.drawn_quadrilaterals import DIFFICULTIES, area_coverage, draw_scene
+from standoff.evaluation.drawn_quadrilaterals import DIFFICULTIES, area_coverage, draw_quadrilateral
 from standoff.evaluation.rectification import METHODS, MethodScore, RectificationResult, evaluate_rectification
 
 
@@ -74,7 +74,7 @@ def test_no_scenes_are_refused() -> None:
 @examples(20)
 @given(st.integers(0, 10_000))
 def test_the_drawn_area_is_the_true_area(seed: int) -> None:
-    corners = draw_scene("clean", seed).corners_px
+    corners = draw_quadrilateral("clean", seed).corners_px
     x, y = corners.T
     true = 0.5 * abs(float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum()))
     perimeter = float(np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1).sum())
@@ -84,6 +84,6 @@ def test_the_drawn_area_is_the_true_area(seed: int) -> None:
 
 @pytest.mark.parametrize("difficulty", DIFFICULTIES)
 def test_a_scene_is_the_same_whenever_it_is_drawn(difficulty: str) -> None:
-    one, two, other = (draw_scene(difficulty, 3, index) for index in (4, 4, 5))  # type: ignore[arg-type]
+    one, two, other = (draw_quadrilateral(difficulty, 3, index) for index in (4, 4, 5))  # type: ignore[arg-type]
     np.testing.assert_array_equal(one.gray, two.gray)
     assert (one.gray != other.gray).any()

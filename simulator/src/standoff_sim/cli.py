@@ -89,7 +89,7 @@ def _clip_command(name: str) -> Callable[..., None]:
     ) -> None:
         from standoff.cli.console import progress
         from standoff_sim.clip.presets import plan_clip
-        from standoff_sim.clip.record import record_cameras, record_clip, record_truth
+        from standoff_sim.clip.write_clip import record_cameras, record_clip, record_truth
 
         width_px, height_px = size_or_none(size)
         plan = plan_clip(

@@ -36,7 +36,7 @@ def composites(
     """Lay rendered machines, people and clutter over photographs of real ground, for training; split by flight."""
     from standoff.cli.console import progress
     from standoff.cli.numbers import two_integers
-    from standoff_sim.composites.recording import CompositePlan, record_composites
+    from standoff_sim.composites.composite_set import CompositePlan, record_composites
 
     width_px, height_px = two_integers(size, "x", expected="a size as WIDTHxHEIGHT", example="1920x1080")
     plan = CompositePlan(

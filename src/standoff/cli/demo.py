@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from standoff.cli.run import detector_overrides, exit_status, tell, watch
+from standoff.cli.run import detector_overrides, exit_status, run_to_end, tell
 from standoff.core.errors import DataError
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ def demo(
     settings = load_settings(clip.settings_file, detector_overrides(model, detections))
     run = open_run(clip.video, out, settings, overwrite=overwrite, checked=lambda: _checked(witness))
     witness = ClipWitness(clip, settings, run.source.size_px)
-    watch(run, quiet=quiet, on_result=witness.take)
+    run_to_end(run, quiet=quiet, on_result=witness.take)
     tell(run, as_json=False, quiet=quiet)
     if not witness.has_seen_all:
         typer.echo("The film was not seen to its end: no comparison with its truth.", err=True)

@@ -14,7 +14,7 @@ from standoff.evaluation.detection.score import PRECISION
 
 if TYPE_CHECKING:
     from standoff.evaluation.detection.comparison import Comparison
-    from standoff.evaluation.detection.trial import TrialResult
+    from standoff.evaluation.detection.detector_trial import TrialResult
 
 _NONE = "n/a"
 _WORKER = next(site_class.name for site_class in CLASSES if site_class.role is Role.PERSON)

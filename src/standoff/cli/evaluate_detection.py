@@ -14,9 +14,9 @@ from standoff.core.errors import ConfigError
 
 if TYPE_CHECKING:
     from standoff.evaluation.detection.comparison import Comparison
+    from standoff.evaluation.detection.detector_trial import DetectorSetup
     from standoff.evaluation.detection.grouping import Grouping
     from standoff.evaluation.detection.material import Material
-    from standoff.evaluation.detection.trial import Candidate
 
 Split = Literal["train", "val", "test", "all"]
 
@@ -94,8 +94,8 @@ def detection(
         write_figures(comparison, figure)
 
 
-def _candidates(models: Sequence[Path], slices: Sequence[str]) -> list[Candidate]:
-    from standoff.evaluation.detection.trial import Candidate
+def _candidates(models: Sequence[Path], slices: Sequence[str]) -> list[DetectorSetup]:
+    from standoff.evaluation.detection.detector_trial import DetectorSetup
 
     expected, example = "--slices COLUMNSxROWS", "--slices 2x1"
     if len(slices) not in (1, len(models)):
@@ -116,7 +116,7 @@ def _candidates(models: Sequence[Path], slices: Sequence[str]) -> list[Candidate
             found=f"{doubled[0]} {labels.count(doubled[0])} times",
             fix="leave the others out",
         )
-    return [Candidate(label, path, grid) for label, path, grid in zip(labels, models, grids, strict=True)]
+    return [DetectorSetup(label, path, grid) for label, path, grid in zip(labels, models, grids, strict=True)]
 
 
 def _names(models: Sequence[Path]) -> list[str]:
@@ -132,11 +132,11 @@ def _names(models: Sequence[Path]) -> list[str]:
 
 
 def _compare(
-    candidates: Sequence[Candidate], material: Material, grouping: Grouping, iou: float, thresholds: Sequence[float]
+    candidates: Sequence[DetectorSetup], material: Material, grouping: Grouping, iou: float, thresholds: Sequence[float]
 ) -> Comparison:
     from standoff.cli.console import progress
     from standoff.evaluation.detection.comparison import compare
-    from standoff.evaluation.detection.trial import require_truth, try_candidate
+    from standoff.evaluation.detection.detector_trial import require_truth, try_candidate
 
     require_truth(material, grouping)
     # What is no detector is to be known before the first hour of another one.

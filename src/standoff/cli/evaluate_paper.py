@@ -12,7 +12,7 @@ import typer
 from standoff.core.errors import ConfigError, StandoffError
 
 if TYPE_CHECKING:
-    from standoff.evaluation.paper import BoxError, ClipResult, Trial
+    from standoff.evaluation.paper import BoxError, ClipResult, MonitorSetup
     from standoff_sim.clip.presets import Plan
 
 Method = Literal["fused", "refined", "paper", "paper+tls", "oriented"]
@@ -63,9 +63,9 @@ def paper(
     """Repeat the paper's tests on clips with exact truth: every figure beside the paper's own."""
     from standoff.cli.console import write_json
     from standoff.cli.paper_tables import print_results
-    from standoff.evaluation.paper import Trial, write_report
+    from standoff.evaluation.paper import MonitorSetup, write_report
 
-    trial = Trial(method, _detector(detector), anchor, _box_error(detector, box_error), seed, camera, height)
+    setup = MonitorSetup(method, _detector(detector), anchor, _box_error(detector, box_error), seed, camera, height)
     folders = list(clips or ())
     if every_preset == bool(folders):
         raise ConfigError(
@@ -77,7 +77,7 @@ def paper(
     if every_preset:
         plans = _plan_presets(clips_folder, seed, size, frames)
         folders = list(plans)
-    results, failures = _evaluate_all(folders, plans, trial)
+    results, failures = _evaluate_all(folders, plans, setup)
     if json_file is not None:
         write_json(_as_json(results, failures), json_file)
     if results and str(json_file) != "-":
@@ -150,7 +150,7 @@ def _plan_presets(folder: Path | None, seed: int, size: str | None, frames: int 
 
 
 def _evaluate_all(
-    folders: Sequence[Path], plans: Mapping[Path, Plan], trial: Trial
+    folders: Sequence[Path], plans: Mapping[Path, Plan], setup: MonitorSetup
 ) -> tuple[list[ClipResult], dict[str, StandoffError]]:
     """Evaluate every clip that can be; render first what is planned and not there."""
     from standoff.clips import SCENE_FILE
@@ -160,7 +160,7 @@ def _evaluate_all(
         try:
             if folder in plans and not (folder / SCENE_FILE).is_file():
                 _render(plans[folder], folder)
-            results.append(_evaluate(folder, trial))
+            results.append(_evaluate(folder, setup))
         except StandoffError as error:
             failures[folder.name or str(folder)] = error
     return results, failures
@@ -168,20 +168,20 @@ def _evaluate_all(
 
 def _render(plan: Plan, folder: Path) -> None:
     from standoff.cli.console import progress
-    from standoff_sim.clip.record import record_clip
+    from standoff_sim.clip.write_clip import record_clip
 
     with progress(f"rendering {plan.name}", plan.preset.frames) as on_frame:
         record_clip(plan, folder, on_frame=on_frame)
 
 
-def _evaluate(folder: Path, trial: Trial) -> ClipResult:
+def _evaluate(folder: Path, setup: MonitorSetup) -> ClipResult:
     from standoff.cli.console import progress
     from standoff.clips import load_clip
     from standoff.evaluation.paper import evaluate_clip
 
     clip = load_clip(folder)
     with progress(f"watching {clip.name}", clip.frame_count) as on_frame:
-        return evaluate_clip(clip, trial, on_frame)
+        return evaluate_clip(clip, setup, on_frame)
 
 
 def _as_json(results: Sequence[ClipResult], failures: Mapping[str, StandoffError]) -> dict[str, Any]:

@@ -25,7 +25,7 @@ def print_results(results: Sequence[ClipResult]) -> None:
     print_warning_times(results)
     _print_benchmark(results)
     _print_map_only(results)
-    facts = "; ".join(f"{name}: {value}" for name, value in results[0].trial.describe().items())
+    facts = "; ".join(f"{name}: {value}" for name, value in results[0].setup.describe().items())
     print_table("", ("", ""), [("tried", facts)], texts=2)
     _print_pooled(results)
 
@@ -43,7 +43,7 @@ def _print_figures(result: ClipResult) -> None:
         return
     columns = ("figure", "paper", "measured", "before", "after", "frames")
     caption = "Measured: as the paper did. Before and after the outlier filter: against exact truth."
-    if result.trial.detector == "truth" and any(figure.name.startswith("ale") for figure in result.figures()):
+    if result.setup.detector == "truth" and any(figure.name.startswith("ale") for figure in result.figures()):
         caption += " With true boxes ALE is 0 by construction."
     print_table(f"{result.clip.name}: beside the paper", columns, figures, caption)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import closing
 from pathlib import Path
 from time import monotonic
@@ -91,38 +91,45 @@ def run(
     from standoff.core.lengths import UNITS
     from standoff.monitor import open_run
 
-    read = {"telemetry": telemetry, "start_s": start, "stop_s": stop, "every": every, "fps": fps}
-    plain = {
-        "source": {name: value for name, value in read.items() if value is not None} or None,
-        "zones": zones,
-        "detect_every": detect_every,
-        "outputs": tuple(filter(None, map(str.strip, outputs.split(",")))) if outputs is not None else None,
-    }
-    overrides: dict[str, Any] = {name: value for name, value in plain.items() if value is not None}
+    overrides = _stated(
+        source=_stated(telemetry=telemetry, start_s=start, stop_s=stop, every=every, fps=fps) or None,
+        zones=zones,
+        detect_every=detect_every,
+        outputs=None if outputs is None else tuple(filter(None, map(str.strip, outputs.split(",")))),
+        show=_stated(unit=unit, blur=blur) or None,
+    )
     overrides |= detector_overrides(model, detections)
-    if shown := {name: value for name, value in {"unit": unit, "blur": blur}.items() if value is not None}:
-        overrides["show"] = shown
     of_ground = GroundOption(ground, reference_box, camera)
-    if of_ground.settings:
-        overrides["ground"] = of_ground.settings
+    overrides |= _stated(ground=of_ground.settings or None)
     settings = load_settings(config, overrides)
     of_ground.check_units(settings.show.unit)
-    said = UNITS[settings.show.unit].said
     opened = open_run(source, out, settings, overwrite=overwrite)
+    _run_with_warnings(opened, UNITS[settings.show.unit].said, as_json=as_json, quiet=quiet)
+    raise typer.Exit(exit_status(opened))
+
+
+def _stated(**options: object) -> dict[str, Any]:
+    """Return the options that were given; of the others the settings file decides."""
+    return {name: value for name, value in options.items() if value is not None}
+
+
+def _run_with_warnings(opened: Run, said: Callable[[str], str], *, as_json: bool, quiet: bool) -> None:
+    """Go through a run and tell what came of it: what is doubtful before it, what became doubtful after it."""
     known = opened.warnings
-    for warning in known:
-        typer.echo(f"standoff: warning: {said(warning)}", err=True)
+    _warn(known, said)
     try:
-        watch(opened, quiet=quiet)
+        run_to_end(opened, quiet=quiet)
     except StandoffError:
         # Its own line says it all; only a machine still wants the record.
         tell(opened, as_json=as_json, quiet=True)
         raise
-    for warning in opened.warnings:
-        if warning not in known:
-            typer.echo(f"standoff: warning: {said(warning)}", err=True)
+    _warn([warning for warning in opened.warnings if warning not in known], said)
     tell(opened, as_json=as_json, quiet=quiet)
-    raise typer.Exit(exit_status(opened))
+
+
+def _warn(warnings: Iterable[str], said: Callable[[str], str]) -> None:
+    for warning in warnings:
+        typer.echo(f"standoff: warning: {said(warning)}", err=True)
 
 
 class _StopRequest:
@@ -141,7 +148,7 @@ class _StopRequest:
         signal.signal(number, signal.SIG_DFL)
 
 
-def watch(opened: Run, *, quiet: bool, on_result: Callable[[FrameResult], None] | None = None) -> None:
+def run_to_end(opened: Run, *, quiet: bool, on_result: Callable[[FrameResult], None] | None = None) -> None:
     """Go through a run with a progress bar; Ctrl-C ends it after the frame in hand.
 
     Args:

@@ -109,8 +109,8 @@ def _train_one(plan: RunPlan, out: Path, *, resumes: bool, quiet: bool) -> None:
 def _plan(config: Path | None, preset: Preset | None, overrides: Overrides, resumed: Path | None) -> RunPlan:
     """Make the plan of the file, of the preset or of the run that is resumed, and of what goes before it."""
     from standoff.training.my_site import read_preset
-    from standoff.training.run.folder import read_run
     from standoff.training.run.plan import make_plan, read_plan
+    from standoff.training.run.training_folder import read_run
 
     if resumed is not None:
         given, origin = read_run(resumed), f"{resumed}/run.yaml and the command line"

@@ -20,7 +20,10 @@ _SYNONYMS: Final = {
 
 _LABELS_NAMED: Final = 12
 IGNORE: Final = "ignore"
-"""In place of a class of the site: nothing is made of this label."""
+"""In a class map, in place of a class of the site: such a label stands for nothing that is asked for.
+
+A detector's box of it is left out; of a labelled box, neither finding nor missing it is wrong.
+"""
 
 DEFAULT_CLASS_MAP: Final[Mapping[str, str]] = MappingProxyType(
     {name: name for name in CLASS_BY_NAME}

@@ -14,7 +14,7 @@ import cv2
 from standoff.core.errors import ModelError, SourceError
 from standoff.core.protocols import Detector
 from standoff.core.types import Frame
-from standoff.evaluation.drawn_quadrilaterals import draw_scene
+from standoff.evaluation.drawn_quadrilaterals import draw_quadrilateral
 from standoff.evaluation.rectification import time_ransac
 from standoff.evaluation.timing import Baseline, Spread
 from standoff.stages.frames import open_source
@@ -30,7 +30,7 @@ def _ms(work: Callable[[], object]) -> float:
 
 def ransac_baseline(scenes: int = 5) -> Baseline:
     """Fit the paper's four lines to drawn quadrilaterals, compiled and as a literal Python loop."""
-    drawn = [draw_scene("clean", seed=0, index=index) for index in range(scenes)]
+    drawn = [draw_quadrilateral("clean", seed=0, index=index) for index in range(scenes)]
     time_ransac(drawn[:1])  # compiles
     ours_ms, theirs_ms, _ = time_ransac(drawn)
     return Baseline(

@@ -34,9 +34,9 @@ from standoff.stages.sinks import (
     PROXIMITY,
     TRACKS,
     Composer,
+    FrameMeasurements,
     HazardSink,
     ReportSink,
-    Scene,
     TableSink,
     VideoParams,
 )
@@ -54,7 +54,7 @@ _SURVEYED_M = np.array([[-12.0, 20.0], [12.0, 20.0], [16.0, 40.0], [-16.0, 40.0]
 _REFERENCE_M = np.array([[-1.5, 24.0], [1.5, 24.0], [1.5, 27.0], [-1.5, 27.0]])
 
 
-class Site:
+class BenchSite:
     """Where everything is and what the camera sees of it.
 
     Args:
@@ -135,7 +135,7 @@ class SiteFilm(protocols.Source):
         count: How many frames it has.
     """
 
-    def __init__(self, site: Site, count: int) -> None:
+    def __init__(self, site: BenchSite, count: int) -> None:
         self._site, self._count = site, count
 
     @property
@@ -167,7 +167,7 @@ class DrawingSink:
         self._composer = self._composer or Composer(frame.size_px, self._params)
         size_px = self._composer.picture_size_px
         picture = frame.image if size_px == frame.size_px else frame.picture.resized_bgr(*size_px)
-        self._composer.compose(picture, Scene.of(result))
+        self._composer.compose(picture, FrameMeasurements.of(result))
 
     def close(self, outcome: Outcome) -> None:
         """Do nothing: there is no file."""
@@ -190,7 +190,7 @@ def monitor_workload(
     Returns:
         Each frame's milliseconds; `own_work()` of it is what the monitor itself costs.
     """
-    site = Site(size_px, tracks)
+    site = BenchSite(size_px, tracks)
     with TemporaryDirectory() as folder:
         monitor = Monitor(
             detector=ScriptedDetector({index: site.detections(index) for index in range(frames)}),

@@ -18,11 +18,11 @@ from standoff.core.errors import DataError
 from standoff.core.types import FrameResult, Severity
 from standoff.evaluation.matching import NOTHING
 from standoff.evaluation.paper.answers import both_radii_m
-from standoff.evaluation.paper.localisation import ClassScore, score_localisation
+from standoff.evaluation.paper.localisation import ClassLocalisation, score_localisation
 from standoff.evaluation.paper.map_only import MapScore, score_map
+from standoff.evaluation.paper.monitor_setup import MonitorSetup, build_monitor, settings_for
+from standoff.evaluation.paper.monitored_clip import Notes, open_clip_video
 from standoff.evaluation.paper.pairs import PairGroup, group_pairs, pair_series
-from standoff.evaluation.paper.trial import Trial, build_monitor, settings_for
-from standoff.evaluation.paper.watch import Notes, open_clip_video
 from standoff.monitor import Run
 
 Pair = tuple[int, int]
@@ -80,7 +80,7 @@ class ClipScore:
     frames: int
     frames_with_map: int
     map_only: MapScore
-    classes: tuple[ClassScore, ...]
+    classes: tuple[ClassLocalisation, ...]
     pairs: tuple[PairGroup, ...]
     encounters: tuple[Encounter, ...]
     false_hazards: tuple[str, ...]
@@ -114,10 +114,10 @@ def score_papers_method(clip: Clip, recording: Path, on_frame: Callable[[], None
         DataError: The clip has no reference object, or the detections are of another video.
         StandoffError: The video or the detections cannot be read.
     """
-    trial = Trial("paper", recording)
+    setup = MonitorSetup("paper", recording)
     with open_clip_video(clip) as source:
-        witness = ClipWitness(clip, settings_for(clip, trial), source.size_px)
-        with closing(iter(Run(source, build_monitor(clip, trial, source)))) as results:
+        witness = ClipWitness(clip, settings_for(clip, setup), source.size_px)
+        with closing(iter(Run(source, build_monitor(clip, setup, source)))) as results:
             for result in results:
                 witness.take(result)
                 if on_frame is not None:
@@ -166,7 +166,7 @@ class ClipWitness:
 
     def score(self) -> ClipScore:
         """Compare what was taken with the truth of the whole clip; see `has_seen_all`."""
-        clip, watched = self._clip, self._notes.watched
+        clip, watched = self._clip, self._notes.monitored
         said = self._said_of_entities()
         encounters = sorted(self._encounters(said), key=lambda one: one.start_s)
         return ClipScore(
@@ -181,7 +181,7 @@ class ClipWitness:
 
     def score_pairs(self) -> tuple[PairGroup, ...]:
         """Compare the distances alone."""
-        return group_pairs(pair_series(self._clip, self._notes.watched, benchmark=False))
+        return group_pairs(pair_series(self._clip, self._notes.monitored, benchmark=False))
 
     def _said_of_entities(self) -> dict[Pair, dict[Severity, float]]:
         """Return when each severity was first said of each pair of entities, or of NOTHING known."""
@@ -206,7 +206,7 @@ class ClipWitness:
             if least_m >= hazard.buffer_m:
                 continue
             kind: Kind = "breach" if least_m < 0.0 else "near miss"
-            close_s = self._notes.watched.time_s[gap_m < (0.0 if kind == "breach" else hazard.buffer_m)]
+            close_s = self._notes.monitored.time_s[gap_m < (0.0 if kind == "breach" else hazard.buffer_m)]
             of_pair = said.get((min(pair), max(pair)), {})
             worst = _worst(of_pair)
             yield Encounter(

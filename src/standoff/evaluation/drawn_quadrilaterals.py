@@ -25,7 +25,7 @@ _LENS_SIGMA_PX = 0.6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Scene:
+class DrawnQuadrilateral:
     """One drawn picture.
 
     Attributes:
@@ -39,7 +39,9 @@ class Scene:
     box_xyxy_px: FloatArray
 
 
-def draw_scene(difficulty: Difficulty, seed: int, index: int = 0, *, corners_px: FloatArray | None = None) -> Scene:
+def draw_quadrilateral(
+    difficulty: Difficulty, seed: int, index: int = 0, *, corners_px: FloatArray | None = None
+) -> DrawnQuadrilateral:
     """Draw one quadrilateral; the same class, seed and index give the same picture.
 
     Args:
@@ -66,7 +68,7 @@ def draw_scene(difficulty: Difficulty, seed: int, index: int = 0, *, corners_px:
     picture = picture + rng.normal(0.0, noise, picture.shape)
     low, high = corners.min(axis=0), corners.max(axis=0)
     box = np.concatenate([low - rng.uniform(3.0, 12.0, 2), high + rng.uniform(3.0, 12.0, 2)])
-    return Scene(np.clip(np.rint(picture), 0, 255).astype(np.uint8), corners, box)
+    return DrawnQuadrilateral(np.clip(np.rint(picture), 0, 255).astype(np.uint8), corners, box)
 
 
 def _random_corners(rng: np.random.Generator) -> FloatArray:

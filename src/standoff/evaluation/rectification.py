@@ -12,7 +12,7 @@ import numpy as np
 
 from standoff.core.homography import FloatArray
 from standoff.core.types import NoGroundMap
-from standoff.evaluation.drawn_quadrilaterals import DIFFICULTIES, Difficulty, Scene, draw_scene
+from standoff.evaluation.drawn_quadrilaterals import DIFFICULTIES, Difficulty, DrawnQuadrilateral, draw_quadrilateral
 from standoff.stages.ground import (
     Edges,
     OutlineFinder,
@@ -102,18 +102,18 @@ def evaluate_rectification(
         raise ValueError(f"scenes must be 1 or more, not {scenes}")
     scores: list[MethodScore] = []
     finders = {method: OutlineFinder(ReferenceParams(method=method)) for method in methods}
-    timed = [draw_scene("clean", seed, index) for index in range(min(scenes, _TIMED_SCENES))]
+    timed = [draw_quadrilateral("clean", seed, index) for index in range(min(scenes, _TIMED_SCENES))]
     for finder in finders.values():
         finder.find(timed[0].gray, timed[0].box_xyxy_px)  # compiles
     for difficulty in DIFFICULTIES:
-        drawn = [draw_scene(difficulty, seed, index) for index in range(scenes)]
+        drawn = [draw_quadrilateral(difficulty, seed, index) for index in range(scenes)]
         scores.extend(_score(finder, difficulty, drawn) for finder in finders.values())
     fast_ms, loop_ms, same_lines = time_ransac(timed)
     scores.sort(key=lambda score: list(methods).index(score.method))
     return RectificationResult(scenes, seed, tuple(scores), median(fast_ms), median(loop_ms), same_lines)
 
 
-def _score(finder: OutlineFinder, difficulty: Difficulty, scenes: Sequence[Scene]) -> MethodScore:
+def _score(finder: OutlineFinder, difficulty: Difficulty, scenes: Sequence[DrawnQuadrilateral]) -> MethodScore:
     milliseconds: list[float] = []
     squared_px: list[float] = []
     squared_sigmas: list[float] = []
@@ -193,7 +193,7 @@ def ransac_by_loop(points_px: FloatArray, pairs: FloatArray, inlier_px: float) -
     return np.array(lines)
 
 
-def time_ransac(scenes: Sequence[Scene]) -> tuple[list[float], list[float], bool]:
+def time_ransac(scenes: Sequence[DrawnQuadrilateral]) -> tuple[list[float], list[float], bool]:
     """Return milliseconds of the RANSAC and of the same hypotheses by a Python loop, and whether both agree exactly."""
     params = ReferenceParams(method="paper")
     pairs = sample_pairs(params.iterations, params.seed)
@@ -213,7 +213,7 @@ def time_ransac(scenes: Sequence[Scene]) -> tuple[list[float], list[float], bool
     return fast_ms, loop_ms, same_lines
 
 
-def paper_edges(scene: Scene) -> Edges:
+def paper_edges(scene: DrawnQuadrilateral) -> Edges:
     """Return the paper's edge points of a drawn scene."""
     params = ReferenceParams(method="paper")
     gradients = sobel_gradients(scene.gray, scene.box_xyxy_px)

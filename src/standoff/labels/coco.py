@@ -26,7 +26,7 @@ from standoff.labels.pictures import canvas_of
 from standoff.labels.places import elsewhere, find_named
 from standoff.labels.source import UNPLACEABLE, BadPicture, SourcePicture, SourceSet, read_each, split_named
 from standoff.labels.strays import mark_within
-from standoff.labels.truth import is_true
+from standoff.labels.truth_values import is_true
 from standoff.labels.types import Problem, Split
 
 _Entry = Mapping[str, Any]

@@ -14,8 +14,6 @@ from standoff.labels.layout import YAML_SUFFIXES
 from standoff.labels.types import SPLITS, Split
 from standoff.labels.yolo import labels_of
 
-IGNORE: Final = "ignore"
-"""In a class map: something is there, but neither finding nor missing it is wrong."""
 DROP: Final = "drop"
 """In a class map: as if the box had never been marked."""
 

@@ -11,11 +11,12 @@ from typing import Final
 import numpy as np
 
 from standoff.core.boxes import unknown_points
+from standoff.core.class_map import IGNORE
 from standoff.core.errors import DataError
 from standoff.core.homography import FloatArray
 from standoff.labels.checks import check_boxes, inside
 from standoff.labels.layout import read_negatives, read_set
-from standoff.labels.mixture import DROP, IGNORE, LabelSource, Mixture, is_mixture, read_mixture
+from standoff.labels.mixture import DROP, LabelSource, Mixture, is_mixture, read_mixture
 from standoff.labels.pictures import TURNED
 from standoff.labels.regions import OWN_REGIONS, read_regions
 from standoff.labels.source import BadPicture, SourcePicture, SourceSet

@@ -21,7 +21,7 @@ from standoff.labels.layout_doubts import CORNERS, check_layout
 from standoff.labels.pictures import SUFFIXES, canvas_of
 from standoff.labels.places import elsewhere, find_named, first_there
 from standoff.labels.source import BadPicture, SourcePicture, SourceSet, read_each
-from standoff.labels.truth import is_true
+from standoff.labels.truth_values import is_true
 from standoff.labels.types import SPLITS, Problem, Split
 from standoff.labels.voc_xml import UNREADABLE, objects_of, parse
 

@@ -9,9 +9,9 @@ from evaluation.detection.drawn_detections import CLASSES, random_scenes
 from standoff.evaluation.detection.accuracy_time import draw_accuracy_time
 from standoff.evaluation.detection.coco import coco_figures
 from standoff.evaluation.detection.comparison import Comparison
+from standoff.evaluation.detection.detector_trial import DetectorSetup, TrialResult
 from standoff.evaluation.detection.points import PointScores
 from standoff.evaluation.detection.score import score_detections
-from standoff.evaluation.detection.trial import Candidate, TrialResult
 
 TIMES_MS = {"net-960x544": 60.0, "net-640x384": 20.0, "other": 33.0, "net-640x384 2x2": 99.0}
 
@@ -19,7 +19,7 @@ TIMES_MS = {"net-960x544": 60.0, "net-640x384": 20.0, "other": 33.0, "net-640x38
 def result(label: str, time_ms: float, seed: int) -> TrialResult:
     truth, found = random_scenes(seed)
     return TrialResult(
-        candidate=Candidate(label, Path("x.onnx"), (1, 1)),
+        candidate=DetectorSetup(label, Path("x.onnx"), (1, 1)),
         model={},
         score=score_detections(truth, found, CLASSES),
         coco=coco_figures(truth, found, CLASSES),

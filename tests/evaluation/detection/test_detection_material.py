@@ -11,11 +11,11 @@ from labelled_sets import write_yolo
 from standoff.core import protocols
 from standoff.core.errors import ConfigError, DataError
 from standoff.core.types import Detections, Frame
+from standoff.evaluation.detection.detector_trial import find_all
 from standoff.evaluation.detection.grouping import site_grouping
 from standoff.evaluation.detection.localisation import ale_by_class_m
 from standoff.evaluation.detection.material import Material, open_material
 from standoff.evaluation.detection.score import score_detections
-from standoff.evaluation.detection.trial import find_all
 from standoff.evaluation.paper.localisation import true_scale_m_per_px
 
 SHIFT_PX = 0.5

@@ -26,9 +26,9 @@ from standoff.evaluation.paper.answers import (
     answers_of,
     score_frames,
 )
-from standoff.evaluation.paper.said import SaidOfPairs
+from standoff.evaluation.paper.monitored_clip import MonitoredClip
+from standoff.evaluation.paper.pair_alarms import PairAlarms
 from standoff.evaluation.paper.warning_time import Breach, find_breaches, summarise
-from standoff.evaluation.paper.watch import Watched
 
 NAN = float("nan")
 
@@ -106,12 +106,12 @@ def small_clip(distance_m: Iterable[float], visible: Iterable[bool] | None = Non
     return cast(Clip, made)
 
 
-def watched_as(distance_m: Iterable[float], said: Iterable[str] | None = None) -> Watched:
+def watched_as(distance_m: Iterable[float], said: Iterable[str] | None = None) -> MonitoredClip:
     series = np.array(list(distance_m))[:, None]
     texts = np.array(list(said) if said is not None else [""] * len(series), dtype=object)[:, None]
     alarmed = (texts == "danger") | (texts == "warning")
     made = SimpleNamespace(distance_m=series, said=texts, alarmed=alarmed, time_s=0.5 * np.arange(len(series)))
-    return cast(Watched, made)
+    return cast(MonitoredClip, made)
 
 
 SETTINGS = load_settings()
@@ -198,7 +198,7 @@ def event(phase: Phase, severity: Severity, track_ids: tuple[int, ...] = (5, 9),
 
 
 def test_hazards_are_followed_from_their_first_event_to_their_last() -> None:
-    said = SaidOfPairs(np.array([[0, 1], [0, 2]]))
+    said = PairAlarms(np.array([[0, 1], [0, 2]]))
     shown = {5: 0, 9: 2}
     frames = [
         ([], ["", ""], [False, False]),
@@ -215,7 +215,7 @@ def test_hazards_are_followed_from_their_first_event_to_their_last() -> None:
 
 
 def test_a_hazard_stays_with_its_pair_when_a_track_is_lost_and_the_worst_of_two_counts() -> None:
-    said = SaidOfPairs(np.array([[0, 1]]))
+    said = PairAlarms(np.array([[0, 1]]))
     said.take([event("opened", "danger")], {5: 0, 9: 1})
     text, alarmed = said.take([event("unknown", "danger")], {5: 0})
     assert (text.tolist(), alarmed.tolist()) == (["unknown"], [True])
@@ -226,7 +226,7 @@ def test_a_hazard_stays_with_its_pair_when_a_track_is_lost_and_the_worst_of_two_
 
 
 def test_hazards_of_nobody_and_of_the_whole_picture_are_left_out() -> None:
-    said = SaidOfPairs(np.array([[0, 1]]))
+    said = PairAlarms(np.array([[0, 1]]))
     of_the_stream = replace(event("opened", "unknown", ()), rule="measurement")
     text, alarmed = said.take([of_the_stream, event("opened", "danger", (5, 30), "two")], {5: 0, 9: 1})
     assert (text.tolist(), alarmed.tolist()) == ([""], [False])

@@ -14,12 +14,12 @@ from standoff.core import protocols
 from standoff.core.camera import CameraPrior
 from standoff.core.errors import DataError
 from standoff.core.types import Detections, Frame, NoCameraMotion, NoGroundMap
-from standoff.evaluation.paper import BoxError, Trial, evaluate_clip
+from standoff.evaluation.paper import BoxError, MonitorSetup, evaluate_clip
+from standoff.evaluation.paper.corner_order import CornerOrder
 from standoff.evaluation.paper.localisation import true_scale_m_per_px
-from standoff.evaluation.paper.trial import settings_for
+from standoff.evaluation.paper.monitor_setup import settings_for
+from standoff.evaluation.paper.monitored_clip import NOT_DETECTED, NOT_VISIBLE, open_clip_video
 from standoff.evaluation.paper.truth_detector import REFERENCE_MARGIN_PX, TrueBoxes
-from standoff.evaluation.paper.turning import Turning
-from standoff.evaluation.paper.watch import NOT_DETECTED, NOT_VISIBLE, open_clip_video
 from standoff.stages.frames import frame_from_array
 from standoff.stages.ground import ReferenceShape
 
@@ -40,7 +40,7 @@ def test_a_reference_that_is_not_whole_in_the_picture_is_counted_apart(clip_fold
     hidden = drawn_clip.HIDDEN[0]
     away.corners_px[hidden, 2, 0] = 1e4
     for known, out_of_sight in ((reference, 0), (away, 1)):
-        score = evaluate_clip(replace(clip, reference=known), Trial(method="oriented")).rectification
+        score = evaluate_clip(replace(clip, reference=known), MonitorSetup(method="oriented")).rectification
         assert score is not None
         assert score.out_of_sight == out_of_sight
         assert score.failed == len(drawn_clip.HIDDEN) - out_of_sight
@@ -49,13 +49,13 @@ def test_a_reference_that_is_not_whole_in_the_picture_is_counted_apart(clip_fold
 def test_which_corner_is_which_is_told(clip_folder: Path) -> None:
     clip = load_clip(clip_folder)
     assert clip.reference is not None
-    settings = settings_for(clip, Trial())
+    settings = settings_for(clip, MonitorSetup())
     assert settings.ground.reference is not None
     first_m = settings.ground.reference.shape().corners_m[0]
     expected = drawn_clip.seen_px(0, first_m[None])[0]
     assert settings.ground.reference.first_corner_px == pytest.approx(expected.tolist())
     unseen = replace(clip, reference_box_px=np.full_like(clip.reference_box_px, np.nan))
-    reference = settings_for(unseen, Trial()).ground.reference
+    reference = settings_for(unseen, MonitorSetup()).ground.reference
     assert reference is not None and reference.first_corner_px is None
 
 
@@ -90,7 +90,7 @@ def test_box_errors_have_the_stated_size_and_depend_on_the_seed_and_the_frame_al
 @pytest.mark.parametrize("turn", range(4))
 def test_a_square_that_was_taken_for_turned_is_turned_back(turn: int) -> None:
     square_m = np.array([[4.0, 1.0], [6.0, 2.0], [5.0, 4.0], [3.0, 3.0]])
-    turning = Turning(ReferenceShape.from_corners(square_m), square_m)
+    turning = CornerOrder(ReferenceShape.from_corners(square_m), square_m)
     true_px = np.array([[10.0, 90.0], [80.0, 95.0], [70.0, 20.0], [15.0, 30.0]])
     error_px, found = turning.compare(np.roll(true_px, -turn, axis=0), true_px)
     assert error_px.tolist() == [0.0] * 4
@@ -100,7 +100,7 @@ def test_a_square_that_was_taken_for_turned_is_turned_back(turn: int) -> None:
 
 def test_an_uneven_shape_is_never_turned() -> None:
     uneven_m = np.array([[0.0, 0.0], [2.4, 0.0], [2.6, 2.6], [-0.3, 2.0]])
-    turning = Turning(ReferenceShape.from_corners(uneven_m), uneven_m[[2, 3, 0, 1]])
+    turning = CornerOrder(ReferenceShape.from_corners(uneven_m), uneven_m[[2, 3, 0, 1]])
     true_px = 10.0 * uneven_m[[2, 3, 0, 1]]
     error_px, turn = turning.compare(10.0 * uneven_m, true_px)
     assert error_px.max() == 0.0 and turn == 0
@@ -108,7 +108,7 @@ def test_an_uneven_shape_is_never_turned() -> None:
 
 
 def test_a_clip_with_a_board_alone_gets_the_lab_test_alone(board_folder: Path) -> None:
-    result = evaluate_clip(load_clip(board_folder), Trial())
+    result = evaluate_clip(load_clip(board_folder), MonitorSetup())
     assert result.board is not None
     assert result.rectification is None and result.groups == ()
 
@@ -123,7 +123,7 @@ def test_a_clip_with_a_board_alone_gets_the_lab_test_alone(board_folder: Path) -
 )
 def test_a_preset_gets_the_papers_figures_that_are_its_own(copy_of: Path, preset: str, figures: set[str]) -> None:
     drawn_clip.change_scene(copy_of, preset=preset)
-    result = evaluate_clip(load_clip(copy_of), Trial(method="oriented"))
+    result = evaluate_clip(load_clip(copy_of), MonitorSetup(method="oriented"))
     assert {figure.name for figure in result.figures()} == figures
     assert {group.class_pair for group in result.groups} == {"worker-wheel_loader", "worker-excavator"}
     assert all("benchmark itself" not in group.scores for group in result.groups)
@@ -146,12 +146,12 @@ class ShiftedBoxes(protocols.Detector):
         return Detections(seen.xyxy_px + np.array([2.0, 0.0, 2.0, 0.0]), seen.score * 0.9, seen.class_id)
 
 
-def _with_model(monkeypatch: pytest.MonkeyPatch, clip: Clip, sees: str) -> Trial:
+def _with_model(monkeypatch: pytest.MonkeyPatch, clip: Clip, sees: str) -> MonitorSetup:
     def build(name: StageName, settings: Settings, camera: CameraPrior | None = None) -> object:
         return ShiftedBoxes(clip, sees) if name == "detect" else build_stage(name, settings, camera)
 
-    monkeypatch.setattr("standoff.evaluation.paper.trial.build_stage", build)
-    return Trial(method="oriented", detector=Path("model.onnx"))
+    monkeypatch.setattr("standoff.evaluation.paper.monitor_setup.build_stage", build)
+    return MonitorSetup(method="oriented", detector=Path("model.onnx"))
 
 
 def test_a_models_boxes_are_matched_with_the_truth_by_overlap(

@@ -14,13 +14,13 @@ from standoff.clips import Clip, load_clip
 from standoff.core.homography import FloatArray
 from standoff.core.pose import View
 from standoff.core.types import GroundMap
-from standoff.evaluation.paper import ClipResult, Trial, evaluate_clip, pool, write_report
+from standoff.evaluation.paper import ClipResult, MonitorSetup, evaluate_clip, pool, write_report
+from standoff.evaluation.paper.corner_order import CornerOrder
 from standoff.evaluation.paper.map_only import NEAR_M, MapSamples, figures_of, score_map
 from standoff.evaluation.paper.mapped_points import MappedPoints, level_feet_px
+from standoff.evaluation.paper.monitor_setup import settings_for
+from standoff.evaluation.paper.monitored_clip import MonitoredClip
 from standoff.evaluation.paper.rectified import score_rectification
-from standoff.evaluation.paper.trial import settings_for
-from standoff.evaluation.paper.turning import Turning
-from standoff.evaluation.paper.watch import Watched
 from standoff.stages.ground import ReferenceShape, load_camera, map_from_view
 
 
@@ -31,7 +31,7 @@ def clip(clip_folder: Path) -> Clip:
 
 @pytest.fixture(scope="module")
 def fused(clip: Clip) -> ClipResult:
-    return evaluate_clip(clip, Trial("fused"))
+    return evaluate_clip(clip, MonitorSetup("fused"))
 
 
 def test_on_level_ground_the_level_feet_are_where_the_picture_shows_the_feet(clip: Clip) -> None:
@@ -81,7 +81,7 @@ def test_a_maps_own_error_is_stated_where_the_truth_is_even_if_the_square_was_ta
     clip: Clip, turn: int
 ) -> None:
     # The camera's place is uncertain in x and y alone, so every point is by as much, whichever way the square turns.
-    turning = Turning(ReferenceShape.from_corners(drawn_clip.SQUARE_M), drawn_clip.SQUARE_M)
+    turning = CornerOrder(ReferenceShape.from_corners(drawn_clip.SQUARE_M), drawn_clip.SQUARE_M)
     ground, points = exact_ground(clip, 3, 0.1), MappedPoints.blank(4, clip.foot_px.shape[1])
     points.take(3, clip.foot_px[3], ground, turning, turn)
     np.testing.assert_allclose(points.xy_m[3], turning.to_site(clip.xy_m[3], turn), atol=1e-6)
@@ -91,7 +91,7 @@ def test_a_maps_own_error_is_stated_where_the_truth_is_even_if_the_square_was_ta
 
 
 def test_a_covariance_turns_with_its_position() -> None:
-    turning = Turning(ReferenceShape.from_corners(drawn_clip.SQUARE_M), drawn_clip.SQUARE_M)
+    turning = CornerOrder(ReferenceShape.from_corners(drawn_clip.SQUARE_M), drawn_clip.SQUARE_M)
     off_m, covariance_m2 = np.array([[0.3, -0.1]]), np.array([[[0.04, 0.01], [0.01, 0.09]]])
     before = off_m[0] @ np.linalg.solve(covariance_m2[0], off_m[0])
     middle_m = drawn_clip.SQUARE_M.mean(axis=0)
@@ -122,9 +122,9 @@ def test_frames_before_the_reference_was_whole_in_the_picture_are_counted_apart(
     corners_px = clip.reference.corners_px.copy()
     corners_px[:5, 0, 0] = -50.0
     late = replace(clip, reference=replace(clip.reference, corners_px=corners_px))
-    watched = Watched.blank(late, (1280, 720))
-    watched.scale_m_per_px[8:] = 0.03
-    score = score_map(late, watched)
+    monitored = MonitoredClip.blank(late, (1280, 720))
+    monitored.scale_m_per_px[8:] = 0.03
+    score = score_map(late, monitored)
     assert (score.without_map, score.frames_since_seen) == (8, drawn_clip.FRAMES - 5)
     assert score.without_map_since_seen == 3
 
@@ -132,14 +132,14 @@ def test_frames_before_the_reference_was_whole_in_the_picture_are_counted_apart(
 def test_a_map_carried_past_the_edge_of_the_picture_is_not_judged_by_corners_that_nobody_sees(
     clip: Clip, fused: ClipResult
 ) -> None:
-    assert clip.reference is not None and fused.watched is not None
-    watched = replace(
-        fused.watched, carried=np.arange(clip.frame_count) < 6, corner_error_px=fused.watched.corner_error_px.copy()
+    assert clip.reference is not None and fused.monitored is not None
+    monitored = replace(
+        fused.monitored, carried=np.arange(clip.frame_count) < 6, corner_error_px=fused.monitored.corner_error_px.copy()
     )
-    watched.corner_error_px[:6] = 50.0
+    monitored.corner_error_px[:6] = 50.0
     corners_px = clip.reference.corners_px.copy()
     corners_px[:6, 0, 0] = -50.0
-    score = score_rectification(watched, replace(clip.reference, corners_px=corners_px))
+    score = score_rectification(monitored, replace(clip.reference, corners_px=corners_px))
     assert (score.out_of_sight, score.failed, score.wrong) == (6, 0, 0)
     assert score.worst_corner_px < 5.0
 
@@ -149,10 +149,10 @@ def test_clips_are_pooled_point_by_point_and_doubted_clip_by_clip(clip: Clip, fu
     alone = pool([fused])
     assert alone is not None and fused.map_only is not None
     assert alone.level == fused.map_only.level and alone.intervals == {}
-    assert fused.watched is not None
-    xy_m = fused.watched.level_feet.xy_m + np.array([3.0, 0.0])
-    watched = replace(fused.watched, level_feet=replace(fused.watched.level_feet, xy_m=xy_m))
-    off = replace(fused, watched=watched, map_only=score_map(clip, watched))
+    assert fused.monitored is not None
+    xy_m = fused.monitored.level_feet.xy_m + np.array([3.0, 0.0])
+    monitored = replace(fused.monitored, level_feet=replace(fused.monitored.level_feet, xy_m=xy_m))
+    off = replace(fused, monitored=monitored, map_only=score_map(clip, monitored))
     both = pool([fused, off])
     assert both is not None
     assert both.level.points == 2 * alone.level.points
@@ -166,15 +166,15 @@ def test_clips_are_pooled_point_by_point_and_doubted_clip_by_clip(clip: Clip, fu
 @pytest.mark.parametrize(
     ("trial", "camera", "height_m"),
     [
-        (Trial("fused"), True, 0.0),
-        (Trial("fused", camera="unknown"), False, 0.0),
-        (Trial("refined", height="unknown"), True, None),
-        (Trial("paper"), False, 0.0),
-        (Trial("paper", camera="file"), True, 0.0),
+        (MonitorSetup("fused"), True, 0.0),
+        (MonitorSetup("fused", camera="unknown"), False, 0.0),
+        (MonitorSetup("refined", height="unknown"), True, None),
+        (MonitorSetup("paper"), False, 0.0),
+        (MonitorSetup("paper", camera="file"), True, 0.0),
     ],
 )
 def test_what_the_monitor_is_told_of_camera_and_height(
-    clip: Clip, trial: Trial, camera: bool, height_m: float | None
+    clip: Clip, trial: MonitorSetup, camera: bool, height_m: float | None
 ) -> None:
     settings = settings_for(clip, trial)
     assert settings.ground.reference is not None

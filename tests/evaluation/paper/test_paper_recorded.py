@@ -12,9 +12,9 @@ from stages.sinks.fake_site import FakeSite
 from standoff.clips import load_clip
 from standoff.core.errors import DataError
 from standoff.core.types import Outcome
-from standoff.evaluation.paper import Trial, evaluate_clip
+from standoff.evaluation.paper import MonitorSetup, evaluate_clip
+from standoff.evaluation.paper.monitored_clip import open_clip_video
 from standoff.evaluation.paper.truth_detector import TrueBoxes
-from standoff.evaluation.paper.watch import open_clip_video
 from standoff.stages.sinks import TableSink, detections_table
 
 
@@ -33,7 +33,7 @@ def record_truth(clip_folder: Path, run: Path) -> Path:
 
 def test_a_run_of_the_clip_stands_in_for_its_detector(clip_folder: Path, tmp_path: Path) -> None:
     run = record_truth(clip_folder, tmp_path / "run")
-    result = evaluate_clip(load_clip(clip_folder), Trial("oriented", run)).to_dict()
+    result = evaluate_clip(load_clip(clip_folder), MonitorSetup("oriented", run)).to_dict()
     assert result["trial"]["detector"] == "recorded in run"
     workers = next(score for score in result["localisation"] if score["class_name"] == "worker")
     assert workers["detected"] == drawn_clip.FRAMES
@@ -46,4 +46,4 @@ def test_a_run_of_another_clip_is_refused(clip_folder: Path, tmp_path: Path) -> 
     with (other / "video.mp4").open("ab") as video:
         video.write(b"\0\0\0\x08free")
     with pytest.raises(DataError, match="with other content"):
-        evaluate_clip(load_clip(other), Trial("oriented", run / "detections.parquet"))
+        evaluate_clip(load_clip(other), MonitorSetup("oriented", run / "detections.parquet"))

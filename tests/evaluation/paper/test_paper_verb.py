@@ -168,7 +168,7 @@ def test_every_preset_is_looked_for_and_none_that_is_there_is_rendered(
         rendered.append((plan.name, plan.preset.frames, plan.preset.width_px))
         raise SimulationError(expected="a graphics card", found="none", fix="buy one")
 
-    monkeypatch.setattr("standoff_sim.clip.record.record_clip", refuse)
+    monkeypatch.setattr("standoff_sim.clip.write_clip.record_clip", refuse)
     few = {name: PRESETS[name] for name in ("virtual", "board", "busy", "far")}
     monkeypatch.setattr("standoff_sim.clip.presets.PRESETS", few)
     shutil.copytree(clip_folder, tmp_path / "virtual")

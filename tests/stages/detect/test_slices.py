@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from standoff.stages.detect.slices import View, held_whole_px, views
+from standoff.stages.detect.slices import Slice, held_whole_px, views
 
 sizes = st.tuples(st.integers(16, 3000), st.integers(16, 3000))
 grids = st.tuples(st.integers(1, 5), st.integers(1, 5))
@@ -38,7 +38,7 @@ def test_neighbours_share_the_overlap() -> None:
 
 
 def test_a_box_is_cut_at_a_border_of_the_slice_but_not_of_the_frame() -> None:
-    view = View(0, 0, 100, 50, (180, 50))
+    view = Slice(0, 0, 100, 50, (180, 50))
     boxes = np.array(
         [
             [10.0, 10.0, 97.0, 30.0],  # near the right border, inside the frame
@@ -68,6 +68,6 @@ def test_a_thing_of_the_held_size_is_whole_in_some_slice_wherever_it_is(
 
 def test_the_margin_may_differ_across_and_up_and_down() -> None:
     # A network that stretches its picture sees a pixel's width and height at different scales.
-    view = View(0, 0, 100, 50, (180, 90))
+    view = Slice(0, 0, 100, 50, (180, 90))
     boxes = np.array([[10.0, 10.0, 94.0, 30.0], [10.0, 10.0, 30.0, 44.0]])
     assert view.is_cut(boxes, (6.0, 3.0)).tolist() == [True, False]

@@ -14,7 +14,7 @@ from standoff.core.homography import FloatArray
 from standoff.core.pose import LENS, View
 from standoff.core.types import CameraMotion, Detections
 from standoff.stages.ground import ReferenceShape
-from standoff.stages.ground.camera_belief import CameraBelief, Moment
+from standoff.stages.ground.camera_belief import CameraBelief, FrameEvidence
 from standoff.stages.ground.solid import SolidState
 from standoff.stages.ground.solid_fit import Belief
 
@@ -28,9 +28,9 @@ PICTURE = drawn(ReferenceShape.square(2.5), STATE)
 def _begun(focal_sigma: float = 0.1, k1_sigma: float = 0.06) -> CameraBelief:
     belief = CameraBelief(CameraPrior(CAMERA, focal_sigma, k1_sigma, "a drone's usual lens"))
     sigma = np.array([0.01, 0.01, 0.01, 0.3, 0.3, 0.3, focal_sigma, k1_sigma, 0.02])
-    moment = Moment(frame(PICTURE, 0.0), Detections.empty(), _still(0.0))
-    belief.predict(moment)
-    belief.begin("reference", Belief(STATE, np.diag(sigma**-2.0)), moment, frame_of="it", keeper="it")
+    evidence = FrameEvidence(frame(PICTURE, 0.0), Detections.empty(), _still(0.0))
+    belief.predict(evidence)
+    belief.begin("reference", Belief(STATE, np.diag(sigma**-2.0)), evidence, frame_of="it", keeper="it")
     return belief
 
 
@@ -41,7 +41,7 @@ def _still(time_s: float, told: RadialDistortion | None = None) -> CameraMotion:
 
 def _heard(belief: CameraBelief, *told: RadialDistortion | None) -> CameraBelief:
     for k, one in enumerate(told, start=1):
-        belief.predict(Moment(frame(PICTURE, 0.2 * k), Detections.empty(), _still(0.2 * k, one)))
+        belief.predict(FrameEvidence(frame(PICTURE, 0.2 * k), Detections.empty(), _still(0.2 * k, one)))
     return belief
 
 
@@ -78,7 +78,7 @@ def test_what_is_told_bit_by_bit_is_what_is_told_at_once() -> None:
 def test_a_reference_is_searched_for_with_what_the_motion_has_told() -> None:
     belief = CameraBelief(CameraPrior(CAMERA, 0.1, 0.06, "a drone's usual lens"))
     belief.predict(
-        Moment(frame(PICTURE, 0.0), Detections.empty(), _still(0.0, RadialDistortion(-0.12, 0.03, FOCAL_PX)))
+        FrameEvidence(frame(PICTURE, 0.0), Detections.empty(), _still(0.0, RadialDistortion(-0.12, 0.03, FOCAL_PX)))
     )
     assert belief.lens.k1_sigma < 0.03
     assert -0.12 < belief.lens.camera.distortion[0] < -0.09

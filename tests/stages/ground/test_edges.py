@@ -9,7 +9,7 @@ from tolerances import EDGE_PX
 
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import ImageArray
-from standoff.evaluation.drawn_quadrilaterals import draw_scene
+from standoff.evaluation.drawn_quadrilaterals import draw_quadrilateral
 from standoff.stages.ground.edges import between_pixels, canny, sobel_gradients
 
 WHOLE = np.array([0.0, 0.0, 319.0, 319.0])
@@ -37,7 +37,7 @@ def points_of(
 
 @pytest.mark.parametrize("seed", range(6))
 def test_edges_agree_with_opencvs_canny_on_the_smoothed_picture(seed: int) -> None:
-    gray = draw_scene("sand", seed).gray
+    gray = draw_quadrilateral("sand", seed).gray
     gradients = sobel_gradients(gray, WHOLE)
     assert gradients is not None
     edges = canny(gradients, 0.6, 0.24)
@@ -51,7 +51,7 @@ def test_edges_agree_with_opencvs_canny_on_the_smoothed_picture(seed: int) -> No
 
 @pytest.mark.parametrize("seed", range(6))
 def test_edges_agree_with_scikit_images_canny(seed: int) -> None:
-    gray = draw_scene("clean", seed).gray
+    gray = draw_quadrilateral("clean", seed).gray
     gradients = sobel_gradients(gray, WHOLE)
     assert gradients is not None
     edges = canny(gradients, 0.6, 0.24)
@@ -63,7 +63,7 @@ def test_edges_agree_with_scikit_images_canny(seed: int) -> None:
 
 
 def test_edges_lie_inside_the_box_only_and_its_border_makes_none() -> None:
-    scene = draw_scene("clean", 3)
+    scene = draw_quadrilateral("clean", 3)
     centre = scene.corners_px.mean(axis=0)
     inner = np.concatenate([centre - 20.0, centre + 20.0])
     box = np.concatenate([scene.corners_px[0] - 30.0, scene.corners_px[0] + 30.0])
@@ -77,7 +77,7 @@ def test_edges_lie_inside_the_box_only_and_its_border_makes_none() -> None:
 
 
 def test_edges_of_a_box_are_those_of_the_whole_picture_in_it() -> None:
-    gray = draw_scene("clean", 4).gray
+    gray = draw_quadrilateral("clean", 4).gray
     box = np.array([60.2, 50.7, 250.9, 240.1])
     part, whole = sobel_gradients(gray, box), sobel_gradients(gray, WHOLE)
     assert part is not None

@@ -27,9 +27,9 @@ from standoff.stages.ground import (
     ReferenceShape,
     marker_pattern,
 )
+from standoff.stages.ground.reference_matching import WHICH
 from standoff.stages.ground.solid import SolidState
 from standoff.stages.ground.solid_choice import NOT_THERE
-from standoff.stages.ground.which_box import WHICH
 
 FIRST = ReferenceShape.rectangle(2.0, 2.89)
 SECOND = ReferenceShape.rectangle(1.4, 1.9)

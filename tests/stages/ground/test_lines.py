@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from skimage.measure import LineModelND
 from tolerances import GEOMETRY_REL
 
-from standoff.evaluation.drawn_quadrilaterals import draw_scene
+from standoff.evaluation.drawn_quadrilaterals import draw_quadrilateral
 from standoff.evaluation.rectification import paper_edges, ransac_by_loop
 from standoff.stages.ground.lines import (
     facing,
@@ -22,7 +22,7 @@ from standoff.stages.ground.lines import (
 
 @pytest.mark.parametrize("seed", range(4))
 def test_compiled_ransac_finds_exactly_the_lines_of_the_literal_loop(seed: int) -> None:
-    points = paper_edges(draw_scene("sand", seed)).points_px
+    points = paper_edges(draw_quadrilateral("sand", seed)).points_px
     pairs = sample_pairs(300, seed)
     contours = ransac_contours(points, pairs, 1.0)
     assert contours is not None
@@ -30,7 +30,7 @@ def test_compiled_ransac_finds_exactly_the_lines_of_the_literal_loop(seed: int) 
 
 
 def test_each_contour_takes_its_inliers_and_only_those_with_it() -> None:
-    points = paper_edges(draw_scene("sand", 8)).points_px
+    points = paper_edges(draw_quadrilateral("sand", 8)).points_px
     contours = ransac_contours(points, sample_pairs(2000, 0), 1.0)
     assert contours is not None
     taken = np.zeros(len(points), dtype=bool)
@@ -90,7 +90,7 @@ def test_facing_turns_a_line_to_the_same_side() -> None:
 
 
 def test_refitting_lowers_the_squared_distance_of_the_inliers() -> None:
-    points = paper_edges(draw_scene("clean", 1)).points_px
+    points = paper_edges(draw_quadrilateral("clean", 1)).points_px
     contours = ransac_contours(points, sample_pairs(2000, 0), 1.0)
     assert contours is not None
     better = refit(points, contours)

@@ -8,9 +8,9 @@ from laws import examples
 
 from standoff.core.homography import FloatArray
 from standoff.core.types import ImageArray, NoGroundMap
-from standoff.evaluation.drawn_quadrilaterals import draw_scene
+from standoff.evaluation.drawn_quadrilaterals import draw_quadrilateral
 from standoff.evaluation.rectification import corner_errors
-from standoff.stages.ground.oriented import RIVALS
+from standoff.stages.ground.oriented_outline import RIVALS
 from standoff.stages.ground.outline import BOX_OUTSIDE, TOO_FEW_EDGES, OutlineFinder
 from standoff.stages.ground.params import ReferenceMethod, ReferenceParams
 from standoff.stages.ground.quadrilateral import Quadrilateral
@@ -33,14 +33,14 @@ def found(
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("seed", range(8))
 def test_corners_of_a_clean_drawing_are_found(method: ReferenceMethod, seed: int) -> None:
-    scene = draw_scene("clean", seed)
+    scene = draw_quadrilateral("clean", seed)
     errors, _ = corner_errors(found(method, scene.gray, scene.box_xyxy_px), scene.corners_px)
     assert np.linalg.norm(errors, axis=1).max() < WORST_PX[method]
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_the_same_picture_gives_the_same_corners_whatever_came_before(method: ReferenceMethod) -> None:
-    scene, other = draw_scene("sand", 1), draw_scene("sand", 2)
+    scene, other = draw_quadrilateral("sand", 1), draw_quadrilateral("sand", 2)
     first = found(method, scene.gray, scene.box_xyxy_px).corners_px
     FINDERS[method].find(other.gray, other.box_xyxy_px)
     fresh = OutlineFinder(ReferenceParams(method=method)).find(scene.gray, scene.box_xyxy_px)
@@ -52,7 +52,7 @@ def test_the_same_picture_gives_the_same_corners_whatever_came_before(method: Re
 @examples(15)
 @given(st.integers(-40, 40), st.integers(-40, 40), st.sampled_from(METHODS), st.integers(0, 5))
 def test_corners_move_with_the_picture(right: int, down: int, method: ReferenceMethod, seed: int) -> None:
-    scene = draw_scene("clean", seed)
+    scene = draw_quadrilateral("clean", seed)
     gray = np.pad(scene.gray, 60, mode="reflect")
     shifted = np.roll(gray, (down, right), axis=(0, 1))
     box = scene.box_xyxy_px + 60.0
@@ -64,7 +64,7 @@ def test_corners_move_with_the_picture(right: int, down: int, method: ReferenceM
 @examples(15)
 @given(st.integers(0, 5), st.integers(1, 3))
 def test_corners_turn_with_the_picture(seed: int, quarters: int) -> None:
-    scene = draw_scene("clean", seed)
+    scene = draw_quadrilateral("clean", seed)
     turned, box, truth = scene.gray, scene.box_xyxy_px, scene.corners_px
     for _ in range(quarters):  # counter-clockwise as seen: x, y becomes y, 319 - x
         turned = np.ascontiguousarray(np.rot90(turned))
@@ -77,7 +77,7 @@ def test_corners_turn_with_the_picture(seed: int, quarters: int) -> None:
 @examples(15)
 @given(st.floats(0.5, 1.0), st.integers(0, 20), st.booleans(), st.integers(0, 5))
 def test_corners_stay_where_light_changes_or_is_inverted(share: float, level: int, inverted: bool, seed: int) -> None:
-    scene = draw_scene("clean", seed)
+    scene = draw_quadrilateral("clean", seed)
     # up to white but not beyond: where the bright side saturates, its edge really moves outwards
     gain = share * (255 - level) / float(scene.gray.max())
     lit = np.rint(scene.gray * gain + level).astype(np.uint8)

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from standoff.core.homography import FloatArray
-from standoff.evaluation.drawn_quadrilaterals import draw_scene
+from standoff.evaluation.drawn_quadrilaterals import draw_quadrilateral
 from standoff.stages.ground.lines import line_through
 from standoff.stages.ground.quadrilateral import (
     NO_QUADRILATERAL,
@@ -115,7 +115,7 @@ def test_reasons_are_different_words_for_different_causes() -> None:
 
 
 def test_the_scenes_sides_join_to_the_scenes_corners() -> None:
-    corners = draw_scene("clean", 1).corners_px
+    corners = draw_quadrilateral("clean", 1).corners_px
     joined = join_lines(side_lines(corners))
     assert joined is not None
     np.testing.assert_allclose(np.sort(joined[0], axis=0), np.sort(corners, axis=0), atol=1e-6)

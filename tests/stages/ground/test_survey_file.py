@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from laws import examples
 from mutations import mutated
-from stages.ground.test_surveyed import LENS, updated
+from stages.ground.test_surveyed_ground import LENS, updated
 
 from standoff.core.errors import GroundError
 from standoff.core.geographic import east_north_m

@@ -10,7 +10,7 @@ import pytest
 from drawn_ground import frame
 from drawn_solid import motion_between
 from sloping_site import SlopingSite, places_m, sloping_site
-from stages.ground.test_surveyed import STILL, blank_frame, refusal, updated
+from stages.ground.test_surveyed_ground import STILL, blank_frame, refusal, updated
 from tolerances import GROUND_THROUGH_LENS_M, OFF_PLANE_M, RELIEF_COVERAGE
 
 from standoff.core.camera import Camera, CameraPrior
@@ -34,7 +34,7 @@ from standoff.stages.ground import (
 )
 from standoff.stages.ground.height_plane import fit_heights
 from standoff.stages.ground.plane_frame import laid_marker, laid_reference, map_in_site
-from standoff.stages.ground.surveyed import SurveyedGround
+from standoff.stages.ground.surveyed_ground import SurveyedGround
 from standoff.stages.locate import LocateParams
 from standoff.stages.locate.uncertainty import relief_covariance
 from standoff_sim.ground.relief import make_relief

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from standoff.stages.hazard.latch import UNMEASURED, Reading
 from standoff.stages.hazard.levels import levels_of
-from standoff.stages.hazard.life import UNMEASURED, Reading
+from standoff.stages.hazard.life_cycle import Limit
 from standoff.stages.hazard.params import HazardParams
-from standoff.stages.hazard.watch import Limit
 
 PROBABLE = HazardParams(warning_probability=0.4, danger_probability=0.6)
 DISTANT = HazardParams(rule="distance")

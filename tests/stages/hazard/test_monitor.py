@@ -1,82 +1,26 @@
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Iterable, Sequence
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from stages.hazard.frames_of_gaps import (
+    CALM,
+    CUT_OFF,
+    FOLLOWED,
+    GROUND,
+    NAN,
+    NO_GROUND,
+    STEP_S,
+    Gaps,
+    events_of,
+    frame,
+    pair_events,
+    told,
+)
 
-from standoff.core.types import GroundMap, GroundPositions, Hazard, NoGroundMap, Proximities
+from standoff.core.types import GroundPositions, NoGroundMap, Proximities
 from standoff.stages.hazard import HazardMonitor, HazardParams
-
-GROUND = GroundMap(np.eye(3), np.zeros((9, 9)), (1920, 1080), "exact", 0.02)
-FOLLOWED = np.zeros(1, dtype=np.bool_)
-NO_GROUND = NoGroundMap("reference not found")
-CUT_OFF = "cut off by the picture's edge"
-NAN = math.nan
-STEP_S = 0.125
-"""A step that floating point knows exactly."""
-CALM = HazardParams(rule="distance", min_duration_s=0.25, release_s=0.5, update_every_s=1000.0, unknown_after_s=1.0)
-
-Pair = tuple[int, int]
-Gaps = dict[Pair, float]
-
-
-def frame(gaps: Gaps, sigma_m: float = 0.1, order: Sequence[int] | None = None) -> tuple[GroundPositions, Proximities]:
-    """Return the rows of one frame; a gap of NaN is a pair that was not measured because one track is cut off."""
-    tracks = sorted({track for pair in gaps for track in pair})
-    lost = {track for track in tracks if all(math.isnan(gap) for pair, gap in gaps.items() if track in pair)}
-    valid = np.array([track not in lost for track in tracks], dtype=np.bool_)
-    count = len(tracks)
-    positions = GroundPositions(
-        track_id=np.array(tracks, dtype=np.int64),
-        class_id=np.zeros(count, dtype=np.int64),
-        xy_m=np.where(valid[:, None], np.zeros((count, 2)), np.nan),
-        velocity_mps=np.zeros((count, 2)),
-        state_covariance=np.zeros((count, 4, 4)),
-        map_factor_m=np.zeros((count, 2, 10)),
-        predicted=np.zeros(count, dtype=np.bool_),
-        standing_s=np.zeros(count),
-        radius_m=np.zeros(count),
-        valid=valid,
-        reason=np.where(valid, "", CUT_OFF).astype(object),
-    )
-    pairs, gap_m = [*gaps], np.array([*gaps.values()], dtype=np.float64)
-    proximities = Proximities(
-        track_a=np.array([a for a, _ in pairs], dtype=np.int64),
-        track_b=np.array([b for _, b in pairs], dtype=np.int64),
-        distance_m=gap_m + 7.8,
-        gap_m=gap_m,
-        sigma_m=gap_m * 0.0 + sigma_m,
-        closing_mps=gap_m * 0.0,
-        time_to_contact_s=gap_m * np.nan,
-        filtered=np.zeros(len(pairs), dtype=np.bool_),
-    )
-    return positions, proximities if order is None else proximities[np.array(order, dtype=np.int64)]
-
-
-def events_of(
-    frames: Iterable[Gaps | NoGroundMap], params: HazardParams = CALM, *, step_s: float = STEP_S
-) -> list[Hazard]:
-    """Run a monitor over frames of gaps by pair; a missing map leaves pair (1, 2) unmeasured."""
-    monitor = HazardMonitor(params)
-    events: list[Hazard] = []
-    for index, gaps in enumerate(frames):
-        ground = gaps if isinstance(gaps, NoGroundMap) else GROUND
-        rows = frame({(1, 2): NAN} if isinstance(gaps, NoGroundMap) else gaps)
-        events += monitor.update(step_s * index, *rows, ground, FOLLOWED)
-    return events
-
-
-def pair_events(gaps_m: Iterable[float], params: HazardParams = CALM) -> list[Hazard]:
-    return events_of([{(1, 2): gap_m} for gap_m in gaps_m], params)
-
-
-def told(events: Iterable[Hazard]) -> list[tuple[str, str, float]]:
-    return [(event.phase, event.severity, event.time_s) for event in events]
 
 
 def test_a_breach_is_opened_as_danger_once_it_has_lasted_and_closed_once_it_is_over() -> None:
@@ -275,97 +219,6 @@ def test_a_reset_forgets_and_leaves_other_streams_alone() -> None:
     first.reset()
     assert first.close(1.0) == ()
     assert len(second.close(1.0)) == 1
-
-
-GAP = st.one_of(st.floats(-3, 5), st.just(NAN))
-FRAME = st.one_of(
-    st.dictionaries(st.sampled_from([(1, 2), (1, 3), (2, 3)]), GAP, max_size=3),
-    st.sampled_from([NO_GROUND, NoGroundMap("map is stale")]),
-)
-FRAMES = st.lists(FRAME, min_size=5, max_size=60)
-
-
-@given(frames=FRAMES)
-def test_every_hazard_is_opened_first_and_closed_last_at_the_end_of_the_stream(
-    frames: list[Gaps | NoGroundMap],
-) -> None:
-    params = HazardParams(min_duration_s=0.125, release_s=0.25, unknown_after_s=0.5, unknown_timeout_s=0.5)
-    monitor = HazardMonitor(params)
-    events: list[Hazard] = []
-    for index, gaps in enumerate(frames):
-        ground = gaps if isinstance(gaps, NoGroundMap) else GROUND
-        rows = frame({(1, 2): NAN} if isinstance(gaps, NoGroundMap) else gaps)
-        events += monitor.update(STEP_S * index, *rows, ground, FOLLOWED)
-    events += monitor.close(STEP_S * len(frames))
-    lives: dict[str, list[Hazard]] = {}
-    for event in events:
-        lives.setdefault(event.hazard_id, []).append(event)
-    for life in lives.values():
-        phases = [event.phase for event in life]
-        assert (phases[0], phases[-1]) == ("opened", "closed")
-        assert set(phases[1:-1]) <= {"updated", "unknown"}
-        assert len({(event.rule, event.track_ids) for event in life}) == 1
-        assert all(earlier.time_s <= later.time_s for earlier, later in itertools.pairwise(life))
-        assert all(event.reason and math.isnan(event.gap_m) for event in life if event.phase == "unknown")
-
-
-def open_intervals(events: list[Hazard], end_s: float) -> dict[Pair, list[tuple[float, float]]]:
-    """Return by pair when a hazard was open."""
-    opened: dict[str, tuple[Pair, float]] = {}
-    spans: dict[Pair, list[tuple[float, float]]] = {}
-    for event in events:
-        if event.rule == "proximity" and event.phase == "opened":
-            opened[event.hazard_id] = ((event.track_ids[0], event.track_ids[1]), event.time_s)
-        elif event.rule == "proximity" and event.phase == "closed":
-            pair, start_s = opened.pop(event.hazard_id)
-            spans.setdefault(pair, []).append((start_s, event.time_s))
-    for pair, start_s in opened.values():
-        spans.setdefault(pair, []).append((start_s, end_s))
-    return spans
-
-
-@given(frames=FRAMES, buffer_m=st.floats(0, 2), wider_m=st.floats(0, 3), radius_m=st.floats(0, 3))
-def test_a_wider_buffer_or_radius_never_removes_a_hazard(
-    frames: list[Gaps | NoGroundMap], buffer_m: float, wider_m: float, radius_m: float
-) -> None:
-    def spans(buffer_m: float, radius_m: float) -> dict[Pair, list[tuple[float, float]]]:
-        params = HazardParams(
-            buffer_m=buffer_m, min_duration_s=0.125, release_s=0.25, unknown_after_s=0.5, unknown_timeout_s=0.5
-        )
-        nearer: list[Gaps | NoGroundMap] = [
-            gaps if isinstance(gaps, NoGroundMap) else {pair: gap_m - radius_m for pair, gap_m in gaps.items()}
-            for gaps in frames
-        ]
-        return open_intervals(events_of(nearer, params), STEP_S * len(frames))
-
-    wide = spans(buffer_m + wider_m, radius_m)
-    for pair, narrow_spans in spans(buffer_m, 0.0).items():
-        for start_s, end_s in narrow_spans:
-            assert any(first <= start_s and end_s <= last for first, last in wide.get(pair, []))
-
-
-@given(gaps=st.lists(st.dictionaries(st.sampled_from([(1, 2), (1, 3), (2, 3)]), GAP, min_size=3), max_size=30))
-def test_the_order_of_the_rows_does_not_matter(gaps: list[Gaps]) -> None:
-    straight, mixed = HazardMonitor(CALM), HazardMonitor(CALM)
-    for index, pairs in enumerate(gaps):
-        first = straight.update(STEP_S * index, *frame(pairs), GROUND, FOLLOWED)
-        second = mixed.update(STEP_S * index, *frame(pairs, order=[2, 0, 1]), GROUND, FOLLOWED)
-        assert [(e.track_ids, e.phase, e.severity) for e in first] == [
-            (e.track_ids, e.phase, e.severity) for e in second
-        ]
-
-
-@given(frames=FRAMES, factor=st.sampled_from([0.25, 2.0, 16.0]))
-def test_a_slower_clock_with_slower_settings_tells_the_same_story(
-    frames: list[Gaps | NoGroundMap], factor: float
-) -> None:
-    durations = {"min_duration_s": 0.25, "release_s": 0.5, "update_every_s": 1.0, "unknown_after_s": 1.0}
-    plain = HazardParams("distance", **durations, unknown_timeout_s=2.0)
-    slow = HazardParams(
-        "distance", **{name: factor * s for name, s in durations.items()}, unknown_timeout_s=2.0 * factor
-    )
-    told_plain = [(p, s, t * factor) for p, s, t in told(events_of(frames, plain))]
-    assert told(events_of(frames, slow, step_s=STEP_S * factor)) == told_plain
 
 
 def test_where_looks_are_rare_a_breach_is_said_at_the_look_that_shows_it() -> None:

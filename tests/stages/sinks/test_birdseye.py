@@ -9,7 +9,7 @@ from standoff.core.camera import Camera
 from standoff.core.types import Frame, FrameResult
 from standoff.stages.sinks import DrawParams
 from standoff.stages.sinks.birdseye import BirdsEye
-from standoff.stages.sinks.scene import Scene
+from standoff.stages.sinks.frame_measurements import FrameMeasurements
 from standoff.stages.sinks.sketch import Sketch
 
 LENS = Camera(640, 360, np.array([[450.0, 0, 320], [0, 450, 180], [0, 0, 1]]), np.array([-0.2, 0.05, 0, 0, 0]))
@@ -17,7 +17,7 @@ PANEL = (300, 400)
 
 
 def _sketch(result: FrameResult) -> Sketch:
-    return Sketch.of(Scene.of(quiet(result)), DrawParams())
+    return Sketch.of(FrameMeasurements.of(quiet(result)), DrawParams())
 
 
 def test_the_window_stays_until_a_track_has_been_outside_for_two_seconds() -> None:

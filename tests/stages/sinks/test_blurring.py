@@ -24,8 +24,8 @@ from standoff.stages.sinks import Composer, DrawParams, ReportParams, ReportSink
 from standoff.stages.sinks.birdseye import BirdsEye
 from standoff.stages.sinks.blurring import PeopleWatch, blur
 from standoff.stages.sinks.collect import RunSummary
+from standoff.stages.sinks.frame_measurements import FrameMeasurements
 from standoff.stages.sinks.overlay import Overlay
-from standoff.stages.sinks.scene import Scene
 from standoff.stages.sinks.sketch import Sketch
 
 SIZE = (640, 360)
@@ -205,8 +205,8 @@ def test_in_the_film_nothing_but_people_changes(size_px: tuple[int, int]) -> Non
     hidden_px = PeopleWatch(wanted=True).update(result)
     picture = result.frame.picture.resized_bgr(*size_px)
     composer = Composer(SIZE, params)
-    plain = composer.compose(picture, Scene.of(quiet(result))).copy()
-    blurred = composer.compose(picture, Scene.of(quiet(result), (), hidden_px)).copy()
+    plain = composer.compose(picture, FrameMeasurements.of(quiet(result))).copy()
+    blurred = composer.compose(picture, FrameMeasurements.of(quiet(result), (), hidden_px)).copy()
     inside = _inside(hidden_px * size_px[0] / SIZE[0], size_px)
     np.testing.assert_array_equal(plain[~inside], blurred[~inside])
     assert _detail(blurred, inside) < 0.25 * _detail(plain, inside)
@@ -216,10 +216,10 @@ def test_without_blur_the_film_is_drawn_on_the_picture_as_it_is() -> None:
     result = FakeSite(SIZE).result(10)
     composer, params, text = Composer(SIZE, VideoParams(max_width_px=900)), DrawParams(), TextSprites()
     width, height = composer.picture_size_px
-    scene = Scene.of(quiet(result), (), PeopleWatch(wanted=False).update(result))
+    measurements = FrameMeasurements.of(quiet(result), (), PeopleWatch(wanted=False).update(result))
     picture = result.frame.picture.resized_bgr(width, height)
-    composed = composer.compose(picture, scene).copy()
-    by_hand, sketch = picture.copy(), Sketch.of(scene, params)
+    composed = composer.compose(picture, measurements).copy()
+    by_hand, sketch = picture.copy(), Sketch.of(measurements, params)
     panel = np.zeros((height, composer.size_px[0] - width, 3), dtype=np.uint8)
     BirdsEye(panel.shape[1::-1], params, text).draw(panel, picture, sketch)
     Overlay(params, text).draw(by_hand, sketch)
@@ -233,10 +233,10 @@ def test_the_panel_shows_the_blurred_picture() -> None:
     params = VideoParams(max_width_px=900, draw=DrawParams(circles=False, labels=False, fans=False, legend=False))
     composer = Composer(SIZE, params)
     width, height = composer.picture_size_px
-    scene = Scene.of(quiet(result), (), np.array([[-50.0, -50.0, 5000.0, 5000.0]]))
-    panel = composer.compose(result.frame.picture.resized_bgr(width, height), scene)[:, width:].copy()
+    measurements = FrameMeasurements.of(quiet(result), (), np.array([[-50.0, -50.0, 5000.0, 5000.0]]))
+    panel = composer.compose(result.frame.picture.resized_bgr(width, height), measurements)[:, width:].copy()
     sharp = composer.compose(
-        result.frame.picture.resized_bgr(width, height), replace(scene, hidden_px=np.zeros((0, 4)))
+        result.frame.picture.resized_bgr(width, height), replace(measurements, hidden_px=np.zeros((0, 4)))
     )
     assert _detail(panel[height // 2 : -40]) < 0.5 * _detail(sharp[height // 2 : -40, width:])
 
@@ -274,7 +274,7 @@ def test_every_picture_of_the_report_is_blurred() -> None:
     assert len(sharp) == len(hidden) == 3
     for one, other in zip(sharp, hidden, strict=True):
         factor = one.picture.shape[1] / (one.region_px[2] - one.region_px[0])
-        people = one.scene.tracks.xyxy_px[one.scene.tracks.class_id == WORKER]
+        people = one.measurements.tracks.xyxy_px[one.measurements.tracks.class_id == WORKER]
         size = (one.picture.shape[1], one.picture.shape[0])
         inside = _inside((people - np.tile(one.region_px[:2], 2)) * factor, size)
         assert inside.any()

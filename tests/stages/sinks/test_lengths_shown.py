@@ -18,7 +18,7 @@ from standoff.drawing.painter import Painter
 from standoff.drawing.text import TextSprites
 from standoff.stages.sinks import Composer, DrawParams, ReportParams, ReportSink, ShowParams, VideoParams
 from standoff.stages.sinks.birdseye import BirdsEye
-from standoff.stages.sinks.scene import Scene
+from standoff.stages.sinks.frame_measurements import FrameMeasurements
 from standoff.stages.sinks.sketch import Sketch
 
 FOOT_M = 0.3048
@@ -41,8 +41,8 @@ def _page(folder: Path, results: list[FrameResult], show: ShowParams) -> str:
 
 
 def test_lines_of_the_film_say_the_same_distances(results: list[FrameResult]) -> None:
-    scene = Scene.of(quiet(results[0]))
-    in_metres, in_feet = (Sketch.of(scene, DrawParams(), unit).lines for unit in (METRES, FEET))
+    measurements = FrameMeasurements.of(quiet(results[0]))
+    in_metres, in_feet = (Sketch.of(measurements, DrawParams(), unit).lines for unit in (METRES, FEET))
     assert len(in_metres) > 2
     for one, other in zip(in_metres, in_feet, strict=True):
         assert one.text.endswith(" m") and other.text.endswith(" ft")
@@ -65,7 +65,7 @@ def test_the_panels_scale_bar_is_as_long_as_it_says(
 
     monkeypatch.setattr(text, "sprite", sprite)
     birdseye = BirdsEye(PANEL, DrawParams(circles=False, labels=False, fans=False), text)
-    sketch = Sketch.of(Scene.of(quiet(results[0])), DrawParams(), unit)
+    sketch = Sketch.of(FrameMeasurements.of(quiet(results[0])), DrawParams(), unit)
     birdseye.draw(panel, results[0].frame.image, sketch)
     (label,) = {word for word in said if word.endswith(f" {unit.symbol}")}
     window = birdseye._window
@@ -98,10 +98,10 @@ def _distances(text: str) -> list[float]:
 
 def test_the_film_differs_in_its_words_only(results: list[FrameResult]) -> None:
     plain = VideoParams(panel=False, draw=DrawParams(labels=False))
-    scene = Scene.of(quiet(results[0]))
+    measurements = FrameMeasurements.of(quiet(results[0]))
     image = results[0].frame.image
     first, other = (
-        Composer((320, 180), plain, ShowParams(unit=name)).compose(cv2.resize(image, (320, 180)), scene).copy()
+        Composer((320, 180), plain, ShowParams(unit=name)).compose(cv2.resize(image, (320, 180)), measurements).copy()
         for name in ("metres", "feet")
     )
     np.testing.assert_array_equal(first, other)

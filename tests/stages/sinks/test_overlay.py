@@ -10,8 +10,8 @@ from standoff.core.types import FrameResult, ImageArray, NoGroundMap, Proximitie
 from standoff.drawing.palette import bgr
 from standoff.drawing.text import TextSprites
 from standoff.stages.sinks import DrawParams
+from standoff.stages.sinks.frame_measurements import FrameMeasurements
 from standoff.stages.sinks.overlay import Overlay
-from standoff.stages.sinks.scene import Scene
 from standoff.stages.sinks.sketch import Sketch
 
 SIZE = (640, 360)
@@ -19,7 +19,7 @@ TEXT = TextSprites()
 
 
 def _sketch(result: FrameResult, hazards: bool = True) -> Sketch:
-    return Sketch.of(Scene.of(result if hazards else quiet(result)), DrawParams())
+    return Sketch.of(FrameMeasurements.of(result if hazards else quiet(result)), DrawParams())
 
 
 def _drawn(result: FrameResult, params: DrawParams | None = None) -> ImageArray:
@@ -48,7 +48,7 @@ def test_without_a_position_nobody_looks_at_ease() -> None:
 def test_an_open_hazard_keeps_its_colour_while_it_cannot_be_measured() -> None:
     site = FakeSite(SIZE)
     results = [site.result(index) for index in range(71)]
-    sketch = Sketch.of(Scene.of(results[-1]), DrawParams())
+    sketch = Sketch.of(FrameMeasurements.of(results[-1]), DrawParams())
     danger = [line for line in sketch.lines if line.tone == "danger"]
     assert danger
     assert all(line.text == "unknown" and line.dashed for line in danger)
@@ -56,12 +56,12 @@ def test_an_open_hazard_keeps_its_colour_while_it_cannot_be_measured() -> None:
 
 def test_each_person_gets_one_line_to_the_nearest_machine() -> None:
     sketch = _sketch(FakeSite(SIZE, tracks=30).result(0), hazards=False)
-    pairs = sketch.scene.proximities
-    workers = int((sketch.scene.tracks.class_id == 0).sum())
+    pairs = sketch.measurements.proximities
+    workers = int((sketch.measurements.tracks.class_id == 0).sum())
     assert 0.5 * workers < len(sketch.lines) <= workers < len(pairs) / 10
     for line in sketch.lines:
-        ids = {int(sketch.scene.tracks.track_id[row]) for row in (line.row_a, line.row_b)}
-        person = next(i for i in ids if sketch.scene.tracks.class_id[i - 1] == 0)
+        ids = {int(sketch.measurements.tracks.track_id[row]) for row in (line.row_a, line.row_b)}
+        person = next(i for i in ids if sketch.measurements.tracks.class_id[i - 1] == 0)
         of_person = (pairs.track_a == person) | (pairs.track_b == person)
         assert line.text == f"{pairs.distance_m[of_person].min():.1f} ±0.3 m"
 
@@ -69,9 +69,9 @@ def test_each_person_gets_one_line_to_the_nearest_machine() -> None:
 def test_a_far_pair_has_a_line_only_with_a_hazard() -> None:
     site = FakeSite(SIZE)
     result = site.result(0)
-    nearest_only = Sketch.of(Scene.of(quiet(result)), DrawParams(line_within_m=0.1))
+    nearest_only = Sketch.of(FrameMeasurements.of(quiet(result)), DrawParams(line_within_m=0.1))
     assert nearest_only.lines == []
-    with_hazards = Sketch.of(Scene.of(result), DrawParams(line_within_m=0.1))
+    with_hazards = Sketch.of(FrameMeasurements.of(result), DrawParams(line_within_m=0.1))
     assert len(with_hazards.lines) == len(result.hazards) > 0
 
 

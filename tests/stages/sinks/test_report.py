@@ -193,7 +193,7 @@ def test_a_worst_moment_shows_its_pair(results: list[FrameResult]) -> None:
         assert picture.shape[1] >= 800
         left, top, right, bottom = moment.region_px
         assert (right - left) / (bottom - top) == pytest.approx(16 / 9, rel=0.05)
-        feet = moment.scene.feet_px()[[int(name.split()[-1]) - 1 for name in moment.names]]
+        feet = moment.measurements.feet_px()[[int(name.split()[-1]) - 1 for name in moment.names]]
         assert ((feet > [left, top]) & (feet < [right, bottom])).all()
 
 

@@ -35,8 +35,8 @@ from standoff.drawing.text import TextSprites
 from standoff.stages.hazard import HazardMonitor
 from standoff.stages.sinks import DrawParams, ReportParams, ReportSink
 from standoff.stages.sinks.birdseye import BirdsEye
+from standoff.stages.sinks.frame_measurements import FrameMeasurements
 from standoff.stages.sinks.overlay import Overlay
-from standoff.stages.sinks.scene import Scene
 from standoff.stages.sinks.shade import PictureShade, diagonals
 from standoff.stages.sinks.sketch import Sketch
 
@@ -56,7 +56,7 @@ def all_cells(value: int) -> CellArray:
 
 
 def sketch(result: FrameResult, watched: WatchedGround, params: DrawParams = BARE) -> Sketch:
-    return Sketch.of(Scene.of(replace(result, watched=watched)), params)
+    return Sketch.of(FrameMeasurements.of(replace(result, watched=watched)), params)
 
 
 def noise(size_px: tuple[int, int], seed: int = 3) -> ImageArray:
@@ -178,20 +178,20 @@ def test_from_above_ground_outside_of_the_picture_looks_as_unwatched_as_ground_i
 
 def test_the_picture_says_how_much_of_the_ground_is_watched_and_why_not_the_rest() -> None:
     result, cells = FakeSite(SIZE).result(0), all_cells(WATCHED)
-    words = sketch(result, of_cells(cells)).scene.watched_words()
+    words = sketch(result, of_cells(cells)).measurements.watched_words()
     assert words == "100 % of the ground watched"
     cells[:9, :16], cells[9, :1] = TOO_SMALL, BLURRED
-    words = sketch(result, of_cells(cells)).scene.watched_words()
+    words = sketch(result, of_cells(cells)).measurements.watched_words()
     assert words == "74 % of the ground watched; rest: workers would be too small"
-    assert sketch(result, of_cells(cells)).scene.watched_words(hatched=True) == words.replace(
+    assert sketch(result, of_cells(cells)).measurements.watched_words(hatched=True) == words.replace(
         "rest:", "rest (hatched):"
     )
     cells[9:, :16] = BEHIND_MACHINE
     cells[:, 20:] = NO_GROUND
-    words = sketch(result, of_cells(cells)).scene.watched_words()
+    words = sketch(result, of_cells(cells)).measurements.watched_words()
     assert words == "20 % of the ground watched; rest: workers would be too small, behind a machine"
-    assert sketch(result, WatchedGround()).scene.watched_words() == ""
-    assert sketch(FakeSite(SIZE).result(70), of_cells(cells)).scene.watched_words() == ""
+    assert sketch(result, WatchedGround()).measurements.watched_words() == ""
+    assert sketch(FakeSite(SIZE).result(70), of_cells(cells)).measurements.watched_words() == ""
     canvas, without = np.zeros((2, SIZE[1], SIZE[0], 3), dtype=np.uint8)
     Overlay(DrawParams(unwatched=False), TEXT).draw(
         canvas, sketch(result, of_cells(cells), DrawParams(unwatched=False))
@@ -204,8 +204,11 @@ def test_a_machine_with_ground_about_it_that_is_not_watched_says_so() -> None:
     result = FakeSite(SIZE).result(0)
     around = np.array([np.nan, 0.62, 0.95, np.nan, 0.0])
     watched = replace(of_cells(all_cells(WATCHED)), around=around)
-    assert sketch(result, watched).scene.around_words() == {2: "62 % around it watched", 5: "0 % around it watched"}
-    assert sketch(result, WatchedGround()).scene.around_words() == {}
+    assert sketch(result, watched).measurements.around_words() == {
+        2: "62 % around it watched",
+        5: "0 % around it watched",
+    }
+    assert sketch(result, WatchedGround()).measurements.around_words() == {}
 
 
 def test_a_stream_of_which_no_ground_is_watched_says_so_as_plainly_as_one_without_map() -> None:
@@ -213,10 +216,10 @@ def test_a_stream_of_which_no_ground_is_watched_says_so_as_plainly_as_one_withou
     result = site.result(0)
     events = monitor.update(0.0, result.positions, result.proximities, result.ground, result.unfollowed, watched)
     unseeing = sketch(replace(result, open_hazards=OpenHazards().after(events)), watched)
-    assert unseeing.scene.unknown_words() == "UNKNOWN: no ground is watched: blurred"
-    assert sketch(result, watched).scene.unknown_words() == ""
+    assert unseeing.measurements.unknown_words() == "UNKNOWN: no ground is watched: blurred"
+    assert sketch(result, watched).measurements.unknown_words() == ""
     lost = sketch(site.result(70), WatchedGround())
-    assert lost.scene.unknown_words() == "NO MEASUREMENT: reference hidden & <not> found"
+    assert lost.measurements.unknown_words() == "NO MEASUREMENT: reference hidden & <not> found"
     for one in (unseeing, lost):
         canvas = np.zeros((SIZE[1], SIZE[0], 3), dtype=np.uint8)
         Overlay(BARE, TEXT).draw(canvas, one)

@@ -41,8 +41,8 @@ from standoff.stages.sinks import (
     TableSink,
 )
 from standoff.stages.sinks.birdseye import BirdsEye
+from standoff.stages.sinks.frame_measurements import FrameMeasurements
 from standoff.stages.sinks.overlay import Overlay
-from standoff.stages.sinks.scene import Scene
 from standoff.stages.sinks.sketch import Sketch
 
 SIZE = (640, 360)
@@ -76,7 +76,9 @@ def watched() -> list[FrameResult]:
 
 
 def sketch(result: FrameResult, hazards: Sequence[Hazard] = ()) -> Sketch:
-    return Sketch.of(Scene.of(replace(result, open_hazards=OpenHazards().after(hazards)), ZONES), DrawParams())
+    return Sketch.of(
+        FrameMeasurements.of(replace(result, open_hazards=OpenHazards().after(hazards)), ZONES), DrawParams()
+    )
 
 
 def drawn(result: FrameResult, hazards: Sequence[Hazard] = ()) -> ImageArray:
@@ -139,11 +141,13 @@ def test_a_zone_with_a_hazard_has_its_colour_and_the_entity_says_where_it_is() -
     inside_px, _ = site.ground().to_image(np.array([[1.5, 7.0], [-2.0, 10.0]]))
     (in_pit, in_hole) = (danger[round(y), round(x)].max() for x, y in inside_px.tolist())
     assert in_pit > 20 and in_hole == 0
-    scene = sketch(site.result(0), [in_zone("danger")]).scene
-    assert scene.zone_words() == {3: "in pit"}
-    assert scene.track_tones()[2] == "danger"
-    assert sketch(site.result(0), [in_zone("warning")]).scene.zone_words() == {3: "near pit"}
-    assert sketch(site.result(0), [in_zone("danger", phase="unknown")]).scene.zone_words() == {3: "perhaps in pit"}
+    measurements = sketch(site.result(0), [in_zone("danger")]).measurements
+    assert measurements.zone_words() == {3: "in pit"}
+    assert measurements.track_tones()[2] == "danger"
+    assert sketch(site.result(0), [in_zone("warning")]).measurements.zone_words() == {3: "near pit"}
+    assert sketch(site.result(0), [in_zone("danger", phase="unknown")]).measurements.zone_words() == {
+        3: "perhaps in pit"
+    }
 
 
 def test_the_hazard_of_a_crossing_is_not_that_of_its_pair() -> None:

@@ -24,7 +24,7 @@ from standoff.training.frame_selection import LabelPlan, LabelReport, SelectionP
 from standoff.training.frame_selection.appearance import blurred, describe, sharpness
 from standoff.training.frame_selection.candidates import look_through
 from standoff.training.frame_selection.doubt import doubt, flickering
-from standoff.training.frame_selection.selection import Candidate
+from standoff.training.frame_selection.selection import CandidateFrame
 
 WIDTH_PX, HEIGHT_PX, FPS = 160, 96, 10
 _NOTHING = Detections(np.zeros((0, 4)), np.zeros(0), np.zeros(0, np.int64))
@@ -144,9 +144,9 @@ def test_a_description_changes_with_colour_edges_and_what_is_found() -> None:
     assert np.isfinite(others).all() and base.shape == (192,)
 
 
-def _candidates(rng: np.random.Generator, count: int) -> list[Candidate]:
+def _candidates(rng: np.random.Generator, count: int) -> list[CandidateFrame]:
     return [
-        Candidate(
+        CandidateFrame(
             index=5 * number,
             time_s=0.2 * number,
             detections=_NOTHING,
@@ -192,7 +192,8 @@ def test_one_frame_of_each_scene_comes_before_a_second_of_any(seed: int) -> None
     rng = np.random.default_rng(seed)
     scenes = rng.normal(size=(6, 8)) * 20
     candidates = [
-        Candidate(n, float(n), _NOTHING, 1.0, 0, 10.0, scenes[n // 10] + rng.normal(size=8) * 0.01) for n in range(60)
+        CandidateFrame(n, float(n), _NOTHING, 1.0, 0, 10.0, scenes[n // 10] + rng.normal(size=8) * 0.01)
+        for n in range(60)
     ]
     chosen = choose(candidates, SelectionParams(frames=6))
     assert sorted(choice.candidate.index // 10 for choice in chosen) == list(range(6))
@@ -202,7 +203,7 @@ def test_one_frame_of_each_scene_comes_before_a_second_of_any(seed: int) -> None
 def test_of_frames_that_look_alike_the_unsure_ones_are_chosen(seed: int) -> None:
     rng = np.random.default_rng(seed)
     doubts = rng.permutation(np.repeat([0.0, 5.0], 50))
-    candidates = [Candidate(n, float(n), _NOTHING, doubts[n], 0, 10.0, rng.normal(size=12)) for n in range(100)]
+    candidates = [CandidateFrame(n, float(n), _NOTHING, doubts[n], 0, 10.0, rng.normal(size=12)) for n in range(100)]
     chosen = choose(candidates, SelectionParams(frames=20))
     assert np.mean([choice.candidate.doubt for choice in chosen]) > 4.5
     assert choose(candidates, SelectionParams(frames=1))[0].candidate.doubt == 5.0
@@ -210,7 +211,7 @@ def test_of_frames_that_look_alike_the_unsure_ones_are_chosen(seed: int) -> None
 
 def test_the_same_picture_again_is_not_worth_labelling() -> None:
     look = np.arange(5.0)
-    candidates = [Candidate(n, float(n), _NOTHING, 1.0, 0, 10.0, look * (n < 20)) for n in range(40)]
+    candidates = [CandidateFrame(n, float(n), _NOTHING, 1.0, 0, 10.0, look * (n < 20)) for n in range(40)]
     assert [choice.candidate.index for choice in choose(candidates, SelectionParams(frames=10))] == [0, 20]
 
 

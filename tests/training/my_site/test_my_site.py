@@ -13,9 +13,9 @@ from standoff.core.errors import DataError, OutputError
 from standoff.labels import read_data
 from standoff.training.my_site import prepare_plan, read_preset
 from standoff.training.my_site.mixture import replay_folder
-from standoff.training.run.folder import PREPARED_DATA
 from standoff.training.run.params import TrainParams
 from standoff.training.run.plan import RunPlan
+from standoff.training.run.training_folder import PREPARED_DATA
 
 _FLIGHTS = "abcdef"
 

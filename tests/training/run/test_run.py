@@ -25,9 +25,9 @@ from standoff.training.darknet.cfg import Yolo, parse_cfg, read_cfg
 from standoff.training.darknet.network import DarknetNetwork, DecodedNetwork
 from standoff.training.darknet.weights import load_weights
 from standoff.training.run.card import card_text
-from standoff.training.run.folder import RunFolder
 from standoff.training.run.loop import Progress
 from standoff.training.run.train import Listener, RunPlan, read_run, train_detector
+from standoff.training.run.training_folder import TrainingFolder
 from standoff.training.run.validation import detect_pictures, validate
 from standoff.training.start.starting_point import backbone_of, fill_network
 
@@ -50,7 +50,7 @@ def _plan(folder: Path, *, points: bool = False, **changes: object) -> RunPlan:
 @pytest.fixture(autouse=True)
 def plain_curves(monkeypatch: pytest.MonkeyPatch) -> None:
     """Draw no curves, which takes half of a short run, except in the finished one, which is made before this."""
-    monkeypatch.setattr("standoff.training.run.folder.draw_curves", lambda rows, classes, path: path.touch())
+    monkeypatch.setattr("standoff.training.run.training_folder.draw_curves", lambda rows, classes, path: path.touch())
 
 
 @pytest.fixture(scope="session")  # of one worker, wherever its turn to run the tests of this file comes
@@ -291,7 +291,7 @@ def test_a_validation_of_which_nothing_can_be_shown_is_still_written(
     score = validate(network, pictures, CLASSES, bf16=False)
     lost = tuple(replace(picture, path=tmp_path / "gone.png") for picture in pictures)
     progress = Progress(step=20, best_step=20, rows=heard.rows[:1])
-    RunFolder(tmp_path, CLASSES).write_validation(progress, score, network, lost)
+    TrainingFolder(tmp_path, CLASSES).write_validation(progress, score, network, lost)
     assert (tmp_path / "best.weights").is_file() and not (tmp_path / "predictions.jpg").exists()
 
 
@@ -362,7 +362,7 @@ def test_a_half_model_that_is_refused_does_not_end_the_run(tmp_path: Path, monke
             expected=f"small shifts from {model_in.name}", found="large ones", fix=f"drop {model_out.name}"
         )
 
-    monkeypatch.setattr("standoff.training.run.folder.store_half", refuse)
+    monkeypatch.setattr("standoff.training.run.training_folder.store_half", refuse)
     plan, heard = _plan(tmp_path, steps=4, warmup_steps=1, validate_every=4), _Heard()
     train_detector(plan, tmp_path / "run", heard.listener())
     assert {"model.onnx", "model-card.md"} <= {path.name for path in (tmp_path / "run").iterdir()}

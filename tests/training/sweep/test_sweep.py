@@ -38,7 +38,7 @@ WriteSweep = Callable[..., Path]
 @pytest.fixture(autouse=True)
 def plain_figure(monkeypatch: pytest.MonkeyPatch) -> None:
     """Draw no curves: the test of the figure looks at them."""
-    monkeypatch.setattr("standoff.training.sweep.folder.draw_sweep", lambda results, path: path.touch())
+    monkeypatch.setattr("standoff.training.sweep.sweep_folder.draw_sweep", lambda results, path: path.touch())
 
 
 @pytest.fixture(scope="session")

@@ -9,7 +9,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from standoff_sim.behaviour.stances import ExcavatorArm, Joints, Stance, stance_keys
+from standoff_sim.behaviour.stances import ExcavatorArm, Joints, TimedStance, stance_keys
 from standoff_sim.movement.motion import STEP_S, Key, Place, fitted, held, with_joints
 from standoff_sim.scene.scene import Model, Motion
 
@@ -23,7 +23,7 @@ OVER_BED_M = 1.3
 BED_M = -1.2
 """Middle of a truck's bed, ahead of its middle."""
 
-Cycle = Callable[[], list[Stance]]
+Cycle = Callable[[], list[TimedStance]]
 
 
 def truck_loading(
@@ -68,17 +68,17 @@ def grading(rng: np.random.Generator, excavator: Model, place: Place, duration_s
     return _cycles(rng, excavator, place, duration_s, lambda: strip(rng, arm))[0]
 
 
-def strip(rng: np.random.Generator, arm: ExcavatorArm) -> list[Stance]:
+def strip(rng: np.random.Generator, arm: ExcavatorArm) -> list[TimedStance]:
     """Pull the bucket in along the ground and reach out again."""
     swing = {"swing_deg": rng.uniform(-35.0, 35.0)}
     far_m, near_m = arm.ground_reach_m * rng.uniform(0.85, 0.95), arm.ground_reach_m * rng.uniform(0.45, 0.55)
     middle_m = 0.5 * (far_m + near_m)
     return [
-        Stance({**arm.at(far_m, 0.5, 0.5), **swing, "load": 0.0}, 2.2),
-        Stance(arm.at(far_m, 0.0, 0.5), 0.8),
-        Stance({**arm.at(middle_m, 0.0, 0.5), "load": 0.25}, 1.6),
-        Stance(arm.at(near_m, 0.0, 0.5), 1.6),
-        Stance(arm.at(near_m, 0.8, 0.5), 0.8),
+        TimedStance({**arm.at(far_m, 0.5, 0.5), **swing, "load": 0.0}, 2.2),
+        TimedStance(arm.at(far_m, 0.0, 0.5), 0.8),
+        TimedStance({**arm.at(middle_m, 0.0, 0.5), "load": 0.25}, 1.6),
+        TimedStance(arm.at(near_m, 0.0, 0.5), 1.6),
+        TimedStance(arm.at(near_m, 0.8, 0.5), 0.8),
     ]
 
 
@@ -88,29 +88,29 @@ def near_zero(model: Model, swing_deg: float) -> float:
     return float(np.clip(swing_deg, low, high))
 
 
-def dig(rng: np.random.Generator, arm: ExcavatorArm, ahead_deg: float) -> list[Stance]:
+def dig(rng: np.random.Generator, arm: ExcavatorArm, ahead_deg: float) -> list[TimedStance]:
     """Fill the bucket."""
     swing_deg = ahead_deg + rng.uniform(-25.0, 25.0)
     reach_m, depth_m = arm.ground_reach_m * rng.uniform(0.8, 0.95), rng.uniform(0.1, 0.5)
     return [
-        Stance({**arm.at(reach_m, 0.9, 0.75), "swing_deg": swing_deg, "load": 0.0}, 4.0),
-        Stance(arm.at(reach_m * 0.98, -0.1, 0.7), 1.0),
-        Stance({**arm.at(reach_m * 0.72, -depth_m, 0.4), "load": 0.5}, 1.9),
-        Stance({**arm.at(reach_m * 0.55, 0.2, 0.05), "swing_deg": swing_deg, "load": 1.0}, 2.0),
-        Stance({"boom_deg": arm.at(reach_m * 0.55, 2.0, 0.0)["boom_deg"]}, 1.4),
+        TimedStance({**arm.at(reach_m, 0.9, 0.75), "swing_deg": swing_deg, "load": 0.0}, 4.0),
+        TimedStance(arm.at(reach_m * 0.98, -0.1, 0.7), 1.0),
+        TimedStance({**arm.at(reach_m * 0.72, -depth_m, 0.4), "load": 0.5}, 1.9),
+        TimedStance({**arm.at(reach_m * 0.55, 0.2, 0.05), "swing_deg": swing_deg, "load": 1.0}, 2.0),
+        TimedStance({"boom_deg": arm.at(reach_m * 0.55, 2.0, 0.0)["boom_deg"]}, 1.4),
     ]
 
 
 def empty_over(
     rng: np.random.Generator, arm: ExcavatorArm, swing_deg: float, reach_m: float, height_m: float
-) -> list[Stance]:
+) -> list[TimedStance]:
     """Swing to one side and empty the bucket there."""
     swing = {"swing_deg": swing_deg + rng.normal(0.0, 3.0)}
     opened: Joints = arm.at(reach_m + rng.uniform(-0.5, 0.5), height_m + rng.uniform(0.0, 0.4), 0.9)
     return [
-        Stance({**opened, **swing, "bucket_deg": arm.bucket_deg(0.0), "load": 1.0}, 3.4),
-        Stance({**opened, **swing, "load": 0.0}, 1.8),
-        Stance({**opened, **swing}, 0.3),
+        TimedStance({**opened, **swing, "bucket_deg": arm.bucket_deg(0.0), "load": 1.0}, 3.4),
+        TimedStance({**opened, **swing, "load": 0.0}, 1.8),
+        TimedStance({**opened, **swing}, 0.3),
     ]
 
 

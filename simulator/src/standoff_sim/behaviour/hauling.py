@@ -18,7 +18,7 @@ from standoff_sim.behaviour.digging import (
     near_zero,
     strip,
 )
-from standoff_sim.behaviour.stances import ExcavatorArm, Stance, stance_keys
+from standoff_sim.behaviour.stances import ExcavatorArm, TimedStance, stance_keys
 from standoff_sim.movement.driving import drive
 from standoff_sim.movement.motion import STEP_S, Key, Place, chained, end_place, fitted, held, shifted, with_joints
 from standoff_sim.scene.scene import Model, Motion
@@ -85,7 +85,7 @@ def hauling(
     return works, fitted(_coming(spot, leaves, returns, visits, duration_s), truck)
 
 
-def _paced(rng: np.random.Generator, cycle: list[Stance]) -> list[Stance]:
+def _paced(rng: np.random.Generator, cycle: list[TimedStance]) -> list[TimedStance]:
     stretch = float(rng.uniform(1.0, 1.2))
     return [replace(stance, after_s=stance.after_s * stretch) for stance in cycle]
 

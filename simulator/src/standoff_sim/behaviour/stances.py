@@ -25,7 +25,7 @@ _GRID_POINTS = 81
 
 
 @dataclass(frozen=True, slots=True)
-class Stance:
+class TimedStance:
     """Joint values to reach, not sooner than some time after the stance before.
 
     Joints that are not named keep moving towards the next stance that names them, so that movements overlap.
@@ -36,7 +36,7 @@ class Stance:
 
 
 def stance_keys(
-    stances: Sequence[Stance], rates_ps: Mapping[str, float], start_s: float = 0.0
+    stances: Sequence[TimedStance], rates_ps: Mapping[str, float], start_s: float = 0.0
 ) -> tuple[dict[str, list[Key]], float]:
     """Give each stance the time at which it is reached, as soon as its own pace and all rates allow.
 

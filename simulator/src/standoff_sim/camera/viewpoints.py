@@ -12,7 +12,7 @@ from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.homography import FloatArray
 from standoff.core.pose import View
 from standoff_sim.camera.flight import Still, drone_camera
-from standoff_sim.scene.moment import Body
+from standoff_sim.scene.moment import EntityState
 from standoff_sim.scene.scene import Batch
 
 _TRIES = 12
@@ -96,7 +96,9 @@ class Obstacles:
         return bool(np.any((enters <= leaves) & (leaves >= 0.0) & (enters <= 1.0)))
 
 
-def draw_view(rng: np.random.Generator, size_px: tuple[int, int], bodies: Sequence[Body], obstacles: Obstacles) -> View:
+def draw_view(
+    rng: np.random.Generator, size_px: tuple[int, int], bodies: Sequence[EntityState], obstacles: Obstacles
+) -> View:
     """Draw a view from 15 to 60 m, now and then from 4 m on, that shows some of the bodies, nothing right before it.
 
     Args:
@@ -132,7 +134,7 @@ def draw_flight(rng: np.random.Generator, view: View, time_s: float) -> Still | 
     return Passing(view, time_s, speed_mps * np.array([np.cos(direction_rad), np.sin(direction_rad), 0.0]))
 
 
-def _draw_target(rng: np.random.Generator, bodies: Sequence[Body]) -> FloatArray:
+def _draw_target(rng: np.random.Generator, bodies: Sequence[EntityState]) -> FloatArray:
     """Draw a point among one, two or three bodies that are near each other; half the time among several."""
     spread_m: FloatArray = np.append(rng.normal(0.0, 3.5, 2), 0.0)
     if not bodies:
@@ -168,7 +170,7 @@ def _shows_people_well(view: View, target_m: FloatArray, *, lands: bool) -> bool
     return least <= share <= most
 
 
-def _count(view: View, bodies: Sequence[Body]) -> int:
+def _count(view: View, bodies: Sequence[EntityState]) -> int:
     """Return how many bodies stand in the picture."""
     if not bodies:
         return 0

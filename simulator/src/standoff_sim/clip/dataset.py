@@ -16,9 +16,9 @@ from standoff.core.pose import View
 from standoff.files.whole import whole_folder
 from standoff.labels.types import Split
 from standoff_sim.camera.viewpoints import Obstacles, draw_flight, draw_view
-from standoff_sim.clip.crew import work_through
-from standoff_sim.clip.picture_set import SET_FILES, Picture, PictureSet, draw_split, is_marked
+from standoff_sim.clip.picture_set import SET_FILES, LabelledImage, PictureSet, draw_split, is_marked
 from standoff_sim.clip.presets import MAX_SEED, Condition, CoverPlan, Plan, Preset, check_seed, check_size
+from standoff_sim.clip.processes import work_through
 from standoff_sim.clip.studio import Studio
 from standoff_sim.clip.truth import Row
 from standoff_sim.ground.site_plans import SiteStyle
@@ -112,11 +112,11 @@ def record_dataset(
 
 
 @contextmanager
-def open_scene_shooter(plan: DatasetPlan) -> Generator[Callable[[int], list[Picture]], None, None]:
+def open_scene_shooter(plan: DatasetPlan) -> Generator[Callable[[int], list[LabelledImage]], None, None]:
     """Give a function from a scene's index to its pictures."""
     studio: Studio | None = None
 
-    def shoot(scene: int) -> list[Picture]:
+    def shoot(scene: int) -> list[LabelledImage]:
         nonlocal studio
         rng = np.random.default_rng([plan.seed, 49979687, scene])
         site = build_site(_draw_plan(rng, plan))
@@ -129,7 +129,7 @@ def open_scene_shooter(plan: DatasetPlan) -> Generator[Callable[[int], list[Pict
             jpeg, entities, view = _shoot(studio, site, obstacles, rng, index)
             name = f"{plan.seed}-{scene:05d}-{index:02d}.jpg"
             size_px = plan.width_px, plan.height_px
-            pictures.append(Picture(name, jpeg, size_px, entities, about={"scene": scene}, view=view))
+            pictures.append(LabelledImage(name, jpeg, size_px, entities, about={"scene": scene}, view=view))
         return pictures
 
     try:

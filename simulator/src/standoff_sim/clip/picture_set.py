@@ -33,7 +33,7 @@ Box = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Picture:
+class LabelledImage:
     """One picture of a data set.
 
     Attributes:
@@ -92,7 +92,7 @@ class PictureSet:
                 (folder / "labels" / split).mkdir(parents=True)
                 (folder / POINTS_FOLDER / split).mkdir(parents=True)
 
-    def add(self, split: Split, picture: Picture) -> None:
+    def add(self, split: Split, picture: LabelledImage) -> None:
         """Write a picture and, in YOLO's layout, its labels."""
         (self._folder / "images" / split / picture.name).write_bytes(picture.jpeg)
         if self._layout == "yolo":

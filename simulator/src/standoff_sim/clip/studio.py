@@ -10,12 +10,12 @@ from standoff.core.types import ImageArray
 from standoff_sim.camera.flight import blur_homography
 from standoff_sim.clip.truth import IdArray, Row, entity_rows, frame_row, pair_rows
 from standoff_sim.render import Renderer
-from standoff_sim.scene.moment import Body, Moment, scene_at
+from standoff_sim.scene.moment import EntityState, Moment, scene_at
 from standoff_sim.scene.site import Site
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Shot:
+class RenderedFrame:
     """One frame and all that is true in it.
 
     Attributes:
@@ -65,7 +65,7 @@ class Studio:
         if site.scene.ground is not earlier.ground or site.scene.props is not earlier.props:
             self._renderer.load(site.scene.ground, site.scene.props)
 
-    def shoot(self, index: int, time_s: float, *, clean: bool = False) -> Shot:
+    def shoot(self, index: int, time_s: float, *, clean: bool = False) -> RenderedFrame:
         """Make one frame.
 
         Args:
@@ -83,7 +83,7 @@ class Studio:
         if not clean:
             image = site.sensor.expose(image, np.random.default_rng([scene.seed, 7919, index]))
         entities = entity_rows(index, moment, rendered.ids, lambda body: self._silhouette_px(moment, body))
-        return Shot(
+        return RenderedFrame(
             index,
             image,
             rendered.ids,
@@ -92,5 +92,5 @@ class Studio:
             frame_row(index, moment, scene.reference, site.board_m, entities),
         )
 
-    def _silhouette_px(self, moment: Moment, body: Body) -> int:
+    def _silhouette_px(self, moment: Moment, body: EntityState) -> int:
         return self._renderer.silhouette_px(moment.view, body.batches)

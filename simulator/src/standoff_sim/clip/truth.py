@@ -21,7 +21,7 @@ from standoff.clips import TRUTH_NUMBERS
 from standoff.core.classes import CLASSES, Role
 from standoff.core.homography import FloatArray
 from standoff.core.pose import View
-from standoff_sim.scene.moment import Body, Moment
+from standoff_sim.scene.moment import EntityState, Moment
 from standoff_sim.scene.scene import Batch, Reference
 from standoff_sim.solids.mesh import Float32Array, Mesh
 
@@ -117,7 +117,7 @@ def visible_boxes_px(ids: IdArray, count: int) -> tuple[FloatArray, npt.NDArray[
     return boxes, sizes
 
 
-def entity_rows(frame: int, moment: Moment, ids: IdArray, silhouette_px: Callable[[Body], int]) -> list[Row]:
+def entity_rows(frame: int, moment: Moment, ids: IdArray, silhouette_px: Callable[[EntityState], int]) -> list[Row]:
     """Return the rows of `TRUTH_SCHEMA` for one frame: every body, and the parked vehicles that show.
 
     Args:
@@ -139,7 +139,7 @@ def entity_rows(frame: int, moment: Moment, ids: IdArray, silhouette_px: Callabl
     return rows
 
 
-def entity_row(frame: int, moment: Moment, body: Body, sight: Sight, foot_px: FloatArray) -> Row:
+def entity_row(frame: int, moment: Moment, body: EntityState, sight: Sight, foot_px: FloatArray) -> Row:
     """Return one row of `TRUTH_SCHEMA`; `foot_px` (2,) is where the body's centre appears."""
     heading_deg = float(np.rad2deg(np.pi / 2 - body.heading_rad) % 360.0)
     numbers = [
@@ -180,7 +180,7 @@ def pair_rows(frame: int, moment: Moment) -> list[Row]:
     ]
 
 
-def _tip_distance_m(first: Body, second: Body) -> float:
+def _tip_distance_m(first: EntityState, second: EntityState) -> float:
     reaches = [
         float(np.linalg.norm(tool.tip_m[:2] - other.centre_m[:2]))
         for tool, other in ((first, second), (second, first))

@@ -24,7 +24,7 @@ from standoff_sim.camera.telemetry import DRIFT_BAND_HZ, Origin
 from standoff_sim.clip.truth import Row
 from standoff_sim.movement.band_noise import BandNoise
 from standoff_sim.movement.motion import sample
-from standoff_sim.scene.scene import NOTHING, Actor, Batch, Ground, Scene
+from standoff_sim.scene.scene import NOTHING, Actor, Batch, GroundSurface, Scene
 
 DRIFT_M = (0.5, 3.0)
 NOISE_M = (0.15, 0.4)
@@ -86,7 +86,7 @@ def report_positions(scene: Scene, duration_s: float, origin: Origin, rng: np.ra
     return sorted(rows, key=lambda row: (row["time_s"], row["device_id"]))
 
 
-def tall_outlines(props: tuple[Batch, ...], ground: Ground) -> shapely.STRtree:
+def tall_outlines(props: tuple[Batch, ...], ground: GroundSurface) -> shapely.STRtree:
     """Return the outlines on the ground of everything that hides a part of the sky."""
     outlines = []
     for batch in props:

@@ -11,13 +11,13 @@ from typing import Any, get_args
 
 import numpy as np
 
+from standoff.core.class_map import IGNORE
 from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.errors import DataError
 from standoff.core.homography import FloatArray
 from standoff.core.types import IntArray
 from standoff.files.yaml_text import read_yaml
 from standoff.labels.documents import check_types, resolve_path
-from standoff.labels.mixture import IGNORE
 from standoff.labels.pictures import canvas_of, find_pictures
 from standoff.labels.regions import corners_of, read_regions
 from standoff.labels.source import BadPicture

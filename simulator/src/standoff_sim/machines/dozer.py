@@ -17,7 +17,7 @@ from standoff_sim.machines.dozer_parts import BLADE_EDGE_M, BLADE_PIVOT_M, CRAWL
 from standoff_sim.machines.joints import UNBOUNDED_M, settle
 from standoff_sim.machines.machine_parts import ram_poses, rectangle
 from standoff_sim.machines.paint import Painted, draw_livery
-from standoff_sim.machines.running_gear import Tracks
+from standoff_sim.machines.running_gear import Crawlers
 from standoff_sim.scene.scene import Batch, moved
 from standoff_sim.solids.mesh import rotation, scaling, translation
 
@@ -45,7 +45,7 @@ class Dozer:
 
     scale: float
     body: tuple[Painted, ...]
-    tracks: Tracks
+    tracks: Crawlers
     blade: tuple[Painted, ...]
     rams: tuple[Painted, Painted]
     ripper: Painted | None
@@ -97,7 +97,7 @@ def make_dozer(rng: np.random.Generator) -> Dozer:
     return Dozer(
         scale=scale,
         body=(Painted(body, livery.body, livery.dust), Painted(dozer_parts.belly(), livery.frame, livery.dust)),
-        tracks=Tracks(CRAWLER, GAUGE_M, shoe, frame),
+        tracks=Crawlers(CRAWLER, GAUGE_M, shoe, frame),
         blade=(
             Painted(dozer_parts.blade(), livery.boom, min(1.0, 1.2 * livery.dust)),
             Painted(dozer_parts.push_arms(), livery.body, livery.dust),

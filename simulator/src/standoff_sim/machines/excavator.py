@@ -27,7 +27,7 @@ from standoff_sim.machines.excavator_sizes import SIZES, ExcavatorSize
 from standoff_sim.machines.joints import UNBOUNDED_DEG, UNBOUNDED_M, settle
 from standoff_sim.machines.machine_parts import highest_m, ram_poses, rectangle
 from standoff_sim.machines.paint import SOILS, Livery, Painted, draw_livery, weather
-from standoff_sim.machines.running_gear import Axles, RunningGear, Tracks
+from standoff_sim.machines.running_gear import Axles, Crawlers, RunningGear
 from standoff_sim.scene.scene import Batch, moved
 from standoff_sim.solids.mesh import Colour, scaling, srgb, translation
 
@@ -201,6 +201,6 @@ def _gear(size: ExcavatorSize, livery: Livery, rng: np.random.Generator) -> Runn
         return Axles(wheels, size.gear_m / 2, np.array(wheel_places(size)))
     shoe, frame = crawler_meshes(size)
     worn = weather(rng, srgb("#5b5148"))
-    return Tracks(
+    return Crawlers(
         crawler_of(size), size.width_m - size.shoe_m, Painted(shoe, worn, dust), Painted(frame, livery.frame, dust)
     )

@@ -14,7 +14,7 @@ from standoff_sim.machines.excavator_body import foot_of
 from standoff_sim.machines.excavator_sizes import ExcavatorSize
 from standoff_sim.machines.machine_parts import Point, Ram, beam, lamp, scoop
 from standoff_sim.machines.paint import BLACK, DARK_GREY
-from standoff_sim.solids.heap import soil_heap
+from standoff_sim.solids.loose_material import soil_heap
 from standoff_sim.solids.mesh import Mesh, Surface, cylinder, join, profile, rotation, translation, tube
 
 Outline = list[tuple[float, float]]

@@ -23,7 +23,7 @@ from standoff_sim.machines.machine_parts import (
     wheel,
 )
 from standoff_sim.machines.paint import BLACK, DARK_GREY, RED_LAMP
-from standoff_sim.solids.heap import soil_heap
+from standoff_sim.solids.loose_material import soil_heap
 from standoff_sim.solids.mesh import Mesh, Surface, box, cylinder, join, profile, rotation, toned, translation
 
 _SHELL = ((1.34, -0.30), (0.47, -0.33), (0.23, -0.25), (0.10, -0.02), (0.11, 0.25), (0.24, 0.55), (0.50, 0.80))

@@ -26,7 +26,7 @@ from standoff_sim.machines.excavator import LIMITS, Excavator, finished, rest_of
 from standoff_sim.machines.excavator_arm import RamMount, mount_rams
 from standoff_sim.machines.machine_parts import Point, beam, rectangle
 from standoff_sim.machines.paint import SOILS, Painted, draw_livery, weather
-from standoff_sim.solids.heap import soil_heap
+from standoff_sim.solids.loose_material import soil_heap
 from standoff_sim.solids.mesh import Mesh, Surface, join, rotation, srgb, translation
 
 PARTS = ("crawler", "body", "boom", "arm", "bucket")

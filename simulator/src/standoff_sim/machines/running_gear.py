@@ -23,7 +23,7 @@ class RunningGear(Protocol):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Tracks:
+class Crawlers:
     """Two crawlers.
 
     Attributes:

@@ -12,7 +12,7 @@ from standoff_sim.machines.machine_parts import strut_pose
 from standoff_sim.machines.paint import CHROME, Painted
 from standoff_sim.scene.scene import Batch
 from standoff_sim.solids.bars import bars
-from standoff_sim.solids.heap import heap
+from standoff_sim.solids.loose_material import heap
 from standoff_sim.solids.mesh import Mesh, Surface, box, cylinder, join, profile, rotation, scaling, srgb, translation
 
 _LOADS = (

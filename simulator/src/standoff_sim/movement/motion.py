@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from standoff.core.homography import FloatArray
-from standoff_sim.scene.scene import Ground, Model, Motion
+from standoff_sim.scene.scene import GroundSurface, Model, Motion
 from standoff_sim.solids.mesh import crossed, rotated_xy, rotation
 
 STEP_S = 0.02
@@ -56,7 +56,7 @@ class Place:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Placement:
+class MotionState:
     """One moment of a motion.
 
     Attributes:
@@ -85,12 +85,12 @@ def wrapped(angle_rad: float) -> float:
     return float((angle_rad + np.pi) % (2 * np.pi) - np.pi)
 
 
-def sample(motion: Motion, time_s: float) -> Placement:
+def sample(motion: Motion, time_s: float) -> MotionState:
     """Read a motion at a moment; the velocity is the mean over one step before and one after."""
     xy_m, share, index = _at(motion, time_s)
     after = min(index + 1, len(motion.time_s) - 1)
     ahead_m, behind_m = _at(motion, time_s + STEP_S)[0], _at(motion, time_s - STEP_S)[0]
-    return Placement(
+    return MotionState(
         xy_m,
         float((1.0 - share) * motion.heading_rad[index] + share * motion.heading_rad[after]),
         (ahead_m - behind_m) / (2 * STEP_S),
@@ -112,7 +112,7 @@ def _at(motion: Motion, time_s: float) -> tuple[FloatArray, float, int]:
     return xy_m, share, index
 
 
-def place_on_ground(placement: Placement, footprint_m: FloatArray, ground: Ground) -> FloatArray:
+def place_on_ground(placement: MotionState, footprint_m: FloatArray, ground: GroundSurface) -> FloatArray:
     """Stand an entity on the ground.
 
     A machine lies on the plane fitted to the heights under its footprint's corners; people stand upright.

@@ -10,7 +10,7 @@ from standoff.core.homography import FloatArray
 from standoff_sim.props.materials import aged
 from standoff_sim.scene.scene import Batch, place
 from standoff_sim.solids.bars import bars, blotches, corrugated, grid, rusted
-from standoff_sim.solids.heap import heap
+from standoff_sim.solids.loose_material import heap
 from standoff_sim.solids.mesh import Colour, Mesh, Surface, box, join, rotation, srgb, translation
 from standoff_sim.solids.panels import panels
 

@@ -9,8 +9,8 @@ import numpy as np
 from standoff_sim.render.context import build_program, set_uniforms
 from standoff_sim.render.frustum import FAR_M, NEAR_M, Frustum
 from standoff_sim.render.geometry import Arena, InstanceDrawer, Instances
+from standoff_sim.render.ground_buffers import GroundBuffers, upload_with_mipmaps
 from standoff_sim.render.noise import make_noise
-from standoff_sim.render.relief import Relief, upload_with_mipmaps
 from standoff_sim.render.shadow import ShadowMap, SunBox
 from standoff_sim.render.surfaces import surface_table
 from standoff_sim.render.targets import OPENNESS_STEP_PX, Targets
@@ -46,8 +46,8 @@ class ColourPass:
         set_uniforms(self._things.program, {"surfaces": surface_table()})
 
     def draw(
-        self, targets: Targets, frustum: Frustum, visible: Instances, arena: Arena, relief: Relief, shadow: ShadowMap,
-        sun: dict[str, object], *, cut_out: bool = False,
+        self, targets: Targets, frustum: Frustum, visible: Instances, arena: Arena, relief: GroundBuffers,
+        shadow: ShadowMap, sun: dict[str, object], *, cut_out: bool = False,
     ) -> None:  # fmt: skip
         """Fill `targets.colour`; `sun` are the uniforms of `sun_uniforms`.
 
@@ -80,7 +80,7 @@ class ColourPass:
         shadow.unuse(_UNITS["shadow_map"], _UNITS["shadow_depth"])
         self._context.copy_framebuffer(targets.resolved, targets.colour_pass)
 
-    def _light_ground(self, targets: Targets, frustum: Frustum, relief: Relief, ground: Any) -> None:  # noqa: ANN401
+    def _light_ground(self, targets: Targets, frustum: Frustum, relief: GroundBuffers, ground: Any) -> None:  # noqa: ANN401
         self._context.enable_only(self._context.DEPTH_TEST)
         targets.ground_depth_pass.use()
         targets.ground_depth_pass.clear(depth=1.0)
@@ -90,7 +90,7 @@ class ColourPass:
         ground.render(vertices=3)
 
     def _draw_samples(
-        self, targets: Targets, frustum: Frustum, visible: Instances, arena: Arena, relief: Relief, *, sky: bool
+        self, targets: Targets, frustum: Frustum, visible: Instances, arena: Arena, relief: GroundBuffers, *, sky: bool
     ) -> None:
         context = self._context
         context.enable_only(context.DEPTH_TEST)

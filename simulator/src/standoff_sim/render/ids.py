@@ -12,8 +12,8 @@ from standoff.core.pose import View
 from standoff_sim.render.context import build_program, set_uniforms
 from standoff_sim.render.frustum import Frustum
 from standoff_sim.render.geometry import Arena, InstanceDrawer, Instances
+from standoff_sim.render.ground_buffers import GroundBuffers
 from standoff_sim.render.lens import LensMap
-from standoff_sim.render.relief import Relief
 from standoff_sim.scene.scene import Batch
 
 _SMALLEST_PX = 8
@@ -31,7 +31,7 @@ class IdPass:
         self._ground = build_program(context, (with_ids, "depth_ground.vert"), ("ids.frag",))
         self._silhouette = _IdTarget(context, (256, 256))
 
-    def draw(self, frustum: Frustum, visible: Instances, arena: Arena, relief: Relief | None) -> None:
+    def draw(self, frustum: Frustum, visible: Instances, arena: Arena, relief: GroundBuffers | None) -> None:
         """Draw into the framebuffer in use, which is clear."""
         self._context.enable_only(self._context.DEPTH_TEST)
         placed = {"clip_from_offset": frustum.clip_from_offset(), "origin": tuple(frustum.view.position_m.tolist())}

@@ -16,13 +16,13 @@ from standoff_sim.render.context import open_context
 from standoff_sim.render.development import Development
 from standoff_sim.render.frustum import Frustum
 from standoff_sim.render.geometry import Arena, Instances
+from standoff_sim.render.ground_buffers import GroundBuffers
 from standoff_sim.render.ids import IdPass
 from standoff_sim.render.look import Look
 from standoff_sim.render.openness import OpennessPass
-from standoff_sim.render.relief import Relief
 from standoff_sim.render.shadow import ShadowMap
 from standoff_sim.render.targets import Targets
-from standoff_sim.scene.scene import Batch, Ground, Light
+from standoff_sim.scene.scene import Batch, GroundSurface, Light
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,7 +82,7 @@ class Renderer:
         self._colour = ColourPass(self._context)
         self._development = Development(self._context, size_px)
         self._targets: Targets | None = None
-        self._relief: Relief | None = None
+        self._relief: GroundBuffers | None = None
         self._static = Instances.of((), self._arena)
 
     def __enter__(self) -> Self:
@@ -97,13 +97,13 @@ class Renderer:
         """Free everything; the renderer cannot be used any more."""
         self._context.release()
 
-    def load(self, ground: Ground, props: Sequence[Batch]) -> None:
+    def load(self, ground: GroundSurface, props: Sequence[Batch]) -> None:
         """Upload a scene in place of the last one; meshes that were uploaded before are not sent again."""
         with self._context:
             if self._relief is not None:
                 self._relief.release()
             self._arena.forget_if_large()
-            self._relief = Relief(self._context, ground)
+            self._relief = GroundBuffers(self._context, ground)
             self._static = Instances.of(props, self._arena)
 
     def render(self, view: View, batches: Sequence[Batch], light: Light, look: Look) -> Rendered:
@@ -152,7 +152,7 @@ class Renderer:
             return self._ids.count_silhouette(view, batches, self._arena)
 
     def _draw(
-        self, view: View, batches: Sequence[Batch], light: Light, relief: Relief, *, cut_out: bool = False
+        self, view: View, batches: Sequence[Batch], light: Light, relief: GroundBuffers, *, cut_out: bool = False
     ) -> tuple[Targets, Frustum]:
         lens_map = self._development.lens_map(view.camera)
         frustum = Frustum(view, lens_map.origin_px, lens_map.size_px)

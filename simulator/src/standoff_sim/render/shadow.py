@@ -13,7 +13,7 @@ from standoff.core.homography import FloatArray
 from standoff_sim.render.context import build_program, set_uniforms
 from standoff_sim.render.frustum import Frustum
 from standoff_sim.render.geometry import Arena, InstanceDrawer, Instances
-from standoff_sim.render.relief import Relief
+from standoff_sim.render.ground_buffers import GroundBuffers
 from standoff_sim.scene.scene import Light
 
 _SMALLEST_PX, _LARGEST_PX = 2048, 4096
@@ -131,7 +131,7 @@ class ShadowMap:
         self._compared.clear(compared_unit)
         self._plain.clear(plain_unit)
 
-    def draw(self, light: Light, frustum: Frustum, instances: Instances, arena: Arena, relief: Relief) -> SunBox:
+    def draw(self, light: Light, frustum: Frustum, instances: Instances, arena: Arena, relief: GroundBuffers) -> SunBox:
         """Draw everything that can shade what the camera sees."""
         points = seen_points(frustum, relief.lowest_m, relief.highest_m + _OBJECTS_M)
         box = fit_box(light.to_sun, points, instances, _MARGIN_M)

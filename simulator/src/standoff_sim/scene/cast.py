@@ -23,7 +23,7 @@ _REFERENCE_CLEAR_M = 3.0
 
 
 @dataclass(frozen=True, slots=True)
-class Stage:
+class FilmedArea:
     """The ground that the camera looks at.
 
     Attributes:
@@ -31,7 +31,7 @@ class Stage:
         scale: 1 for a camera at 25 m; things stand further apart when seen from higher up.
         duration_s: Of all motions.
         excavator_mesh: Folder of parts in place of the procedural excavators, or None.
-        reference_m: (2,) where the reference object's middle is, in the stage's directions; None without one.
+        reference_m: (2,) where the reference object's middle is, in the area's directions; None without one.
         mean_stature_m: Of the workers, barefoot.
     """
 
@@ -43,7 +43,7 @@ class Stage:
     mean_stature_m: float = MEAN_STATURE_M
 
     def place(self, x_m: float, y_m: float, turn_deg: float = 0.0) -> Place:
-        """Return a place on the stage in site coordinates."""
+        """Return a place in the area in site coordinates."""
         right_rad = -np.deg2rad(self.heading_deg)
         return Place(0.0, 0.0, float(right_rad)).moved(x_m, y_m, float(np.deg2rad(turn_deg)))
 

@@ -11,7 +11,7 @@ import numpy as np
 from standoff.core.errors import ConfigError
 from standoff.core.homography import FloatArray
 from standoff_sim.props.materials import BARE_STEEL, SANDS, SOILS, WOODS, block, mound, relief, ripples, tints
-from standoff_sim.scene.scene import Cover, Ground, Reference, place
+from standoff_sim.scene.scene import Cover, GroundSurface, Reference, place
 from standoff_sim.solids.mesh import Mesh, Surface, join, rotation, srgb, toned, translation
 
 _TARPAULINS = tuple(srgb(code) for code in ("#2f5f8f", "#4d6b4a", "#8a8c8a", "#3b3c3e"))
@@ -45,7 +45,7 @@ class _Bed:
 
 
 def make_cover(
-    rng: np.random.Generator, kind: str, reference: Reference, ground: Ground, start_s: float, stop_s: float
+    rng: np.random.Generator, kind: str, reference: Reference, ground: GroundSurface, start_s: float, stop_s: float
 ) -> Cover:
     """Lay something on a reference object.
 

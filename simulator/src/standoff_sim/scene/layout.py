@@ -16,7 +16,7 @@ import shapely
 
 from standoff.core.homography import FloatArray
 from standoff_sim.props.prop import Prop
-from standoff_sim.scene.scene import Batch, Ground
+from standoff_sim.scene.scene import Batch, GroundSurface
 from standoff_sim.solids.mesh import Mesh, rotated_xy
 
 _CELL_M = 0.2
@@ -50,7 +50,7 @@ class _Spot:
 
 def lay_out(
     rng: np.random.Generator, props: Sequence[Prop], density: float, keep_clear: Sequence[shapely.Polygon],
-    extent_m: tuple[float, float, float, float], ground: Ground,
+    extent_m: tuple[float, float, float, float], ground: GroundSurface,
 ) -> tuple[Batch, ...]:  # fmt: skip
     """Strew props over a site.
 
@@ -82,7 +82,7 @@ def lay_out(
 
 
 def _settle(
-    rng: np.random.Generator, spot: _Spot, batches: Sequence[Batch], yard: _Yard, ground: Ground
+    rng: np.random.Generator, spot: _Spot, batches: Sequence[Batch], yard: _Yard, ground: GroundSurface
 ) -> FloatArray | None:
     """Find room at a spot or within a step of it, take it and return the pose; None without room."""
     low, high, top_m = _bounds(batches)
@@ -283,7 +283,7 @@ def _turned(local_m: FloatArray, spot: _Spot) -> FloatArray:
     return rotated_xy(local_m, spot.turn_rad) + spot.xy_m
 
 
-def _stand(spot: _Spot, corners_m: FloatArray, top_m: float, ground: Ground) -> FloatArray | None:
+def _stand(spot: _Spot, corners_m: FloatArray, top_m: float, ground: GroundSurface) -> FloatArray | None:
     """Return the pose on the ground, or None where it is too steep or too rough.
 
     Low things take the slope under them, tall ones stand upright; both sink in until no part hangs visibly over.

@@ -10,12 +10,12 @@ import numpy as np
 from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.homography import FloatArray
 from standoff.core.pose import View
-from standoff_sim.movement.motion import Placement, place_on_ground, sample
-from standoff_sim.scene.scene import CARRIED, NOTHING, Actor, Batch, Cover, Ground, Reference, Scene, moved
+from standoff_sim.movement.motion import MotionState, place_on_ground, sample
+from standoff_sim.scene.scene import CARRIED, NOTHING, Actor, Batch, Cover, GroundSurface, Reference, Scene, moved
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Body:
+class EntityState:
     """One named entity at a moment.
 
     Attributes:
@@ -56,8 +56,8 @@ class Moment:
 
     time_s: float
     view: View
-    bodies: tuple[Body, ...]
-    parked: tuple[Body, ...]
+    bodies: tuple[EntityState, ...]
+    parked: tuple[EntityState, ...]
     loose: tuple[Batch, ...]
     reference_covered: bool
 
@@ -79,15 +79,15 @@ def scene_at(scene: Scene, time_s: float) -> Moment:
     return Moment(time_s, scene.flight.view(time_s), tuple(bodies), parked, tuple(loose), bool(loose))
 
 
-def _actor_body(actor: Actor, time_s: float, ground: Ground) -> Body:
+def _actor_body(actor: Actor, time_s: float, ground: GroundSurface) -> EntityState:
     model = actor.model
-    placement: Placement = sample(actor.motion, time_s)
+    placement: MotionState = sample(actor.motion, time_s)
     local_to_site = place_on_ground(placement, model.footprint_m, ground)
     tip_m = model.tool_tip_m(placement.joints)
     rotation, offset = local_to_site[:3, :3], local_to_site[:3, 3]
     outline = np.column_stack([model.footprint_m, np.zeros(len(model.footprint_m))]) @ rotation.T + offset
     parts = moved(model.parts(placement.joints), local_to_site)
-    return Body(
+    return EntityState(
         actor.entity_id,
         model.class_id,
         tuple(replace(part, entity_id=actor.entity_id) for part in parts if part.entity_id != CARRIED),
@@ -101,11 +101,11 @@ def _actor_body(actor: Actor, time_s: float, ground: Ground) -> Body:
 
 
 @lru_cache(maxsize=1024)
-def _parked_body(batch: Batch) -> Body:
+def _parked_body(batch: Batch) -> EntityState:
     local_to_site = batch.poses[0].astype(np.float64)
     low, high = batch.mesh.vertices_m[:, :2].min(axis=0), batch.mesh.vertices_m[:, :2].max(axis=0)
     outline = np.array([low, (high[0], low[1]), high, (low[0], high[1])], dtype=np.float64)
-    return Body(
+    return EntityState(
         batch.entity_id,
         CLASS_BY_NAME["vehicle"].id,
         (batch,),
@@ -118,9 +118,9 @@ def _parked_body(batch: Batch) -> Body:
     )
 
 
-def _reference_body(reference: Reference) -> Body:
+def _reference_body(reference: Reference) -> EntityState:
     edge = reference.base_m[1] - reference.base_m[0]
-    return Body(
+    return EntityState(
         reference.entity_id,
         CLASS_BY_NAME["reference"].id,
         reference.batches,

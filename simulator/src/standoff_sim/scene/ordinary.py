@@ -20,7 +20,7 @@ from standoff.core.homography import FloatArray
 from standoff_sim import behaviour
 from standoff_sim.movement.footpaths import Footpaths, rounded
 from standoff_sim.movement.motion import Place, chained, end_place, fitted, shifted
-from standoff_sim.scene.cast import Cast, Stage
+from standoff_sim.scene.cast import Cast, FilmedArea
 from standoff_sim.scene.scene import Model, Motion
 from standoff_sim.scene.work_grounds import BODY_M, HALF_M, Acting, WorkGround, WorkSite, set_machines_to_work
 
@@ -37,14 +37,14 @@ _GANGS, _PLACES, _WALKERS = 2, 6, 3
 _ELBOW_ROOM_M, _TURN = 0.8, 2.4
 
 
-def ordinary_site(rng: np.random.Generator, stage: Stage) -> Cast:
+def ordinary_site(rng: np.random.Generator, area: FilmedArea) -> Cast:
     """Cast an ordinary site.
 
     Args:
         rng: Decides everything.
-        stage: Where, and for how long.
+        area: Where, and for how long.
     """
-    site = set_machines_to_work(rng, stage)
+    site = set_machines_to_work(rng, area)
     keep_off_m = float(rng.uniform(*_KEEP_OFF_M))
     avoided = [one.ground.buffer(keep_off_m) for one in site.machines] + [body.buffer(BODY_M) for body in site.bodies]
     paths = Footpaths(shapely.union_all(avoided))
@@ -82,7 +82,7 @@ class _Day:
     @classmethod
     def begun(cls, site: WorkSite, paths: Footpaths, places_m: list[FloatArray]) -> _Day:
         """Let somebody stand at one of the places."""
-        rng, worker = site.rng, site.stage.worker(site.rng)
+        rng, worker = site.rng, site.area.worker(site.rng)
         x_m, y_m = places_m[int(rng.integers(len(places_m)))].tolist()
         place = Place(x_m, y_m, float(rng.uniform(0.0, 2 * np.pi)))
         return cls(site, paths, places_m, worker, behaviour.staying(rng, worker, place, float(rng.uniform(1.0, 60.0))))
@@ -90,7 +90,7 @@ class _Day:
     @property
     def is_over(self) -> bool:
         """Whether nothing more is needed."""
-        return bool(self.motion.time_s[-1] >= self.site.stage.duration_s)
+        return bool(self.motion.time_s[-1] >= self.site.area.duration_s)
 
     def run(self, goal_m: FloatArray, stays_s: float) -> bool:
         """Go somewhere on ways that keep off machines, if that can be."""
@@ -194,14 +194,14 @@ def _free(site: WorkSite, paths: Footpaths, room_m: float) -> FloatArray:
         if paths.are_free(spot_m + ring_m).all():
             return spot_m
     # A site without room has its people in front of it.
-    return site.stage.place(float(site.rng.uniform(-10.0, 10.0)), -HALF_M[1] - 8.0).xy_m
+    return site.area.place(float(site.rng.uniform(-10.0, 10.0)), -HALF_M[1] - 8.0).xy_m
 
 
 def _gang(site: WorkSite, middle_m: FloatArray) -> list[Acting]:
     """Let two or three work together."""
-    rng, lasting_s = site.rng, site.stage.duration_s
+    rng, lasting_s = site.rng, site.area.duration_s
     middle = Place(float(middle_m[0]), float(middle_m[1]), float(rng.uniform(0.0, 2 * np.pi)))
-    first, second, third = (site.stage.worker(rng) for _ in range(3))
+    first, second, third = (site.area.worker(rng) for _ in range(3))
     people = [(first, behaviour.standing_working(rng, first, middle.moved(0.0, 1.8), lasting_s))]
     if rng.random() < 0.3:
         pair = second, third
@@ -223,5 +223,5 @@ def _unloader(site: WorkSite) -> list[Acting]:
     place = end_place(motion).moved(float(site.rng.uniform(-1.5, 1.5)), side_m)
     if any(one.ground.distance(shapely.Point(place.xy_m)) < 1.0 for one in site.machines):
         return []
-    worker = site.stage.worker(site.rng)
-    return [(worker, behaviour.standing_working(site.rng, worker, place, site.stage.duration_s))]
+    worker = site.area.worker(site.rng)
+    return [(worker, behaviour.standing_working(site.rng, worker, place, site.area.duration_s))]

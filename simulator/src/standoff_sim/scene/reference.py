@@ -15,7 +15,7 @@ from standoff.core.errors import ConfigError
 from standoff.core.homography import FloatArray
 from standoff_sim.props.materials import block, relief
 from standoff_sim.props.rebar import starters
-from standoff_sim.scene.scene import Ground, Reference, place
+from standoff_sim.scene.scene import GroundSurface, Reference, place
 from standoff_sim.solids.mesh import Colour, Mesh, Surface, box, join, rotation, srgb, toned, translation
 from standoff_sim.solids.panels import panels
 
@@ -36,7 +36,7 @@ _CONCRETES = tuple(srgb(code) for code in ("#d2cec4", "#dad6cb", "#c6c3bb", "#d8
 
 
 def make_reference(
-    rng: np.random.Generator, kind: str, centre_xy_m: tuple[float, float], heading_deg: float, ground: Ground,
+    rng: np.random.Generator, kind: str, centre_xy_m: tuple[float, float], heading_deg: float, ground: GroundSurface,
     entity_id: int, *, worn: bool = True,
 ) -> Reference:  # fmt: skip
     """Build a reference object on level ground.

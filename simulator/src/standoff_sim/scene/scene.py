@@ -90,7 +90,7 @@ class Light:
     haze: Colour
 
 
-class Ground(Protocol):
+class GroundSurface(Protocol):
     """The relief and its look; `standoff_sim.ground.terrain.Terrain`.
 
     Attributes:
@@ -252,7 +252,7 @@ class Scene:
 
     name: str
     seed: int
-    ground: Ground
+    ground: GroundSurface
     props: tuple[Batch, ...]
     actors: tuple[Actor, ...]
     parked: tuple[Batch, ...]

@@ -21,13 +21,13 @@ from standoff_sim.props.fences import make_fence
 from standoff_sim.props.heaps import scatter_litter
 from standoff_sim.props.plant import PLANT
 from standoff_sim.render import Look
-from standoff_sim.scene.cast import Cast, Stage
+from standoff_sim.scene.cast import Cast, FilmedArea
 from standoff_sim.scene.casting import CASTS, bend_over
 from standoff_sim.scene.covers import make_cover
 from standoff_sim.scene.layout import lay_out
 from standoff_sim.scene.light import level_luminance, random_light
 from standoff_sim.scene.reference import board_corners_m, make_reference
-from standoff_sim.scene.scene import PARKED, Batch, Flight, Ground, Light, Reference, Scene, moved
+from standoff_sim.scene.scene import PARKED, Batch, Flight, GroundSurface, Light, Reference, Scene, moved
 from standoff_sim.solids.mesh import translation
 from standoff_sim.surroundings.surroundings import make_surroundings
 
@@ -112,14 +112,14 @@ def build_site(plan: Plan) -> Site:
     duration_s = plan.duration_s * 1.3 + 1.0  # a variable rate takes longer than the nominal one
     scale = max(1.0, preset.altitude_m / 25.0)
     reference_m = None if preset.shape is None else preset.reference_offset_m
-    stage = Stage(heading_deg, scale, duration_s, plan.excavator_mesh, reference_m, plan.stature_m)
-    cast = CASTS[preset.cast](rng["cast"], stage)
+    area = FilmedArea(heading_deg, scale, duration_s, plan.excavator_mesh, reference_m, plan.stature_m)
+    cast = CASTS[preset.cast](rng["cast"], area)
     bend_over(rng["people"], cast, plan.stooping)
     flight = make_flight(
         rng["flight"], preset.motion, camera, target_xy_m=np.zeros(2), altitude_m=preset.altitude_m,
         pitch_deg=preset.pitch_deg, heading_deg=heading_deg, duration_s=plan.duration_s,
     )  # fmt: skip
-    reference_xy_m = stage.place(*preset.reference_offset_m).xy_m
+    reference_xy_m = area.place(*preset.reference_offset_m).xy_m
     filming = flight if plan.camera == 1 else _fly_elsewhere(plan, camera, heading_deg)
     ground = _shape_ground(rng["ground"], preset, cast, reference_xy_m)
     reference = _place_reference(rng["reference"], plan, reference_xy_m, heading_deg, ground)
@@ -178,7 +178,7 @@ def _pair(xy_m: FloatArray) -> tuple[float, float]:
 
 
 def _place_reference(
-    rng: np.random.Generator, plan: Plan, xy_m: FloatArray, heading_deg: float, ground: Ground
+    rng: np.random.Generator, plan: Plan, xy_m: FloatArray, heading_deg: float, ground: GroundSurface
 ) -> Reference | None:
     preset = plan.preset
     if preset.shape is None:
@@ -212,7 +212,7 @@ def _furnished(plan: Plan, flight: Flight) -> tuple[float, float, float, float]:
 
 
 def _raise_crane(
-    rng: np.random.Generator, preset: Preset, clear: Sequence[shapely.Polygon], flight: Flight, ground: Ground,
+    rng: np.random.Generator, preset: Preset, clear: Sequence[shapely.Polygon], flight: Flight, ground: GroundSurface,
     light: Light,
 ) -> tuple[tuple[Batch, ...], shapely.Polygon]:  # fmt: skip
     """Put up a tower crane on some sites, so that its shadow falls across the work; return it and the ground it takes.
@@ -240,7 +240,7 @@ def _raise_crane(
 
 def _furnish(
     rng: np.random.Generator, preset: Preset, clear: Sequence[shapely.Polygon], bed: shapely.Polygon,
-    extent_m: tuple[float, float, float, float], ground: Ground,
+    extent_m: tuple[float, float, float, float], ground: GroundSurface,
 ) -> tuple[Batch, ...]:  # fmt: skip
     """Lay out clutter, away from everybody's ways and from the reference object's bed."""
     families = [*CLUTTER, *(prop for prop in PLANT.values() if prop.name != "crane")]
@@ -249,7 +249,7 @@ def _furnish(
     return laid + scatter_litter(rng, int(0.5 * preset.clutter * region.area), region, ground.height_at)
 
 
-def _fence_in(rng: np.random.Generator, ground: Ground) -> tuple[Batch, ...]:
+def _fence_in(rng: np.random.Generator, ground: GroundSurface) -> tuple[Batch, ...]:
     """Put a fence around the site."""
     half_m = _EXTENT_M / 2 - _FENCE_IN_M
     corners = np.array([[-half_m, -half_m], [half_m, -half_m], [half_m, half_m], [-half_m, half_m], [-half_m, -half_m]])

@@ -17,7 +17,7 @@ from standoff_sim.machines.vehicle import make_vehicle
 from standoff_sim.machines.wheel_loader import make_wheel_loader
 from standoff_sim.movement.footpaths import rounded
 from standoff_sim.movement.motion import STEP_S, Place, chained, fitted, held, shifted
-from standoff_sim.scene.cast import Stage
+from standoff_sim.scene.cast import FilmedArea
 from standoff_sim.scene.scene import Model, Motion
 
 HALF_M = (36.0, 28.0)
@@ -94,7 +94,7 @@ class WorkSite:
 
     Attributes:
         rng: Decides everything.
-        stage: Where it lies.
+        area: Where it lies.
         machines: At work.
         parked: Machines that stand all the time.
         bodies: What stands there all the time, machines and others.
@@ -102,7 +102,7 @@ class WorkSite:
     """
 
     rng: np.random.Generator
-    stage: Stage
+    area: FilmedArea
     machines: list[WorkGround] = field(default_factory=list)
     parked: list[Acting] = field(default_factory=list)
     bodies: list[shapely.Geometry] = field(default_factory=list)
@@ -111,7 +111,7 @@ class WorkSite:
     def spot(self, inset_m: float = 0.0) -> Place:
         """Draw a place and a heading."""
         x_m, y_m = self.rng.uniform(-1.0, 1.0, 2) * (np.array(HALF_M) - inset_m)
-        return self.stage.place(float(x_m), float(y_m), float(self.rng.uniform(0.0, 360.0)))
+        return self.area.place(float(x_m), float(y_m), float(self.rng.uniform(0.0, 360.0)))
 
     def is_clear(self, ground: shapely.Geometry) -> bool:
         """Return whether nothing else is there."""
@@ -122,14 +122,14 @@ class WorkSite:
         """Return whether it lies on the site."""
         wide_m, deep_m = HALF_M
         corners = ((-wide_m, -deep_m), (wide_m, -deep_m), (wide_m, deep_m), (-wide_m, deep_m))
-        return bool(shapely.Polygon([self.stage.place(x, y).xy_m for x, y in corners]).covers(ground))
+        return bool(shapely.Polygon([self.area.place(x, y).xy_m for x, y in corners]).covers(ground))
 
     def add(self, model: Model, motion: Motion) -> None:
         """Give a machine its ground."""
         self.machines.append(WorkGround.of(model, motion))
 
 
-def set_machines_to_work(rng: np.random.Generator, stage: Stage) -> WorkSite:
+def set_machines_to_work(rng: np.random.Generator, area: FilmedArea) -> WorkSite:
     """Let an excavator load a truck, a loader carry to a heap and a roller compact a lane, as far as there is room.
 
     Some machines stand parked. On every second site somebody gets into a car and drives off. The first machine is the
@@ -137,10 +137,10 @@ def set_machines_to_work(rng: np.random.Generator, stage: Stage) -> WorkSite:
 
     Args:
         rng: Decides everything.
-        stage: Where, and for how long.
+        area: Where, and for how long.
     """
-    site = WorkSite(rng, stage)
-    site.bodies += stage.reserved()
+    site = WorkSite(rng, area)
+    site.bodies += area.reserved()
     _haul(site)
     _heap(site)
     _roll(site)
@@ -150,19 +150,19 @@ def set_machines_to_work(rng: np.random.Generator, stage: Stage) -> WorkSite:
 
 
 def _haul(site: WorkSite) -> None:
-    rng, stage = site.rng, site.stage
-    excavator, truck = stage.excavator(rng), make_dump_truck(rng)
+    rng, area = site.rng, site.area
+    excavator, truck = area.excavator(rng), make_dump_truck(rng)
     for _ in range(_TRIES):
         outward_rad = float(rng.uniform(0.0, 2 * np.pi))
         middle = np.array([np.cos(outward_rad), np.sin(outward_rad)]) * (np.array(HALF_M) - 12.0)
-        out = stage.place(float(middle[0]), float(middle[1]), float(np.rad2deg(outward_rad) + rng.normal(0.0, 10.0)))
+        out = area.place(float(middle[0]), float(middle[1]), float(np.rad2deg(outward_rad) + rng.normal(0.0, 10.0)))
         side = float(rng.choice([-1.0, 1.0]))
         spot = out.moved(float(rng.normal(1.0, 0.6)), side * float(rng.uniform(7.3, 8.3)), float(rng.normal(0.0, 0.1)))
         digs = out.moved(0.0, 0.0, np.pi + side * float(rng.uniform(0.0, 0.6)))
         if site.is_clear(shapely.Point(digs.xy_m).buffer(_REACH_M["excavator"])) or not site.bodies:
             break
     for model, motion in zip(
-        (excavator, truck), behaviour.hauling(rng, excavator, truck, digs, spot, stage.duration_s), strict=True
+        (excavator, truck), behaviour.hauling(rng, excavator, truck, digs, spot, area.duration_s), strict=True
     ):
         site.add(model, motion)
 
@@ -176,7 +176,7 @@ def _heap(site: WorkSite) -> None:
         heap = pile.moved(-11.0, side * 11.0, -side * np.pi / 2 + float(rng.normal(0.0, 0.1)))
         rough = shapely.LineString([pile.xy_m, pile.moved(-14.0, -side * 5.0).xy_m, heap.xy_m])
         if site.is_clear(rough.buffer(_REACH_M["wheel_loader"] + _APART_M)):
-            site.add(loader, behaviour.heaping(rng, loader, pile, heap, site.stage.duration_s))
+            site.add(loader, behaviour.heaping(rng, loader, pile, heap, site.area.duration_s))
             return
 
 
@@ -188,9 +188,9 @@ def _roll(site: WorkSite) -> None:
         start, length_m = site.spot(), float(rng.uniform(12.0, 22.0))
         lane = shapely.LineString([start.xy_m, start.moved(length_m, 0.8).xy_m])
         if site.is_clear(lane.buffer(_REACH_M["roller_or_dozer"] + _APART_M)) and site.is_within(lane):
-            motion = behaviour.rolling(rng, roller, start, length_m, site.stage.duration_s)
+            motion = behaviour.rolling(rng, roller, start, length_m, site.area.duration_s)
             site.add(roller, motion)
-            driver = site.stage.worker(rng)
+            driver = site.area.worker(rng)
             site.riders.append((driver, fitted(behaviour.riding(motion, *_SEAT["roller_or_dozer"]), driver)))
             return
 
@@ -202,10 +202,10 @@ _GETTING_IN_S = 30.0
 def _drive_off(site: WorkSite) -> None:
     """On some sites let a car stand until somebody walks up to it, gets in and drives off."""
     rng = site.rng
-    leaves_s = STEP_S * round(float(rng.uniform(0.2, 0.9)) * site.stage.duration_s / STEP_S)
+    leaves_s = STEP_S * round(float(rng.uniform(0.2, 0.9)) * site.area.duration_s / STEP_S)
     if rng.random() < 0.5 or leaves_s < _GETTING_IN_S:
         return
-    car, driver = make_vehicle(rng), site.stage.worker(rng)
+    car, driver = make_vehicle(rng), site.area.worker(rng)
     for _ in range(_TRIES):
         start = site.spot()
         lane = shapely.LineString([start.xy_m, start.moved(30.0).xy_m])
@@ -239,7 +239,7 @@ def _park(site: WorkSite) -> None:
         model: Model = makers[int(rng.integers(len(makers)))](rng)
         for _ in range(_TRIES):
             place = site.spot()
-            motion = behaviour.idle(rng, model, place, site.stage.duration_s)
+            motion = behaviour.idle(rng, model, place, site.area.duration_s)
             body = shapely.MultiPoint([place.moved(x, y).xy_m for x, y in model.footprint_m.tolist()]).convex_hull
             if site.is_clear(body.buffer(_APART_M)):
                 site.bodies.append(body)

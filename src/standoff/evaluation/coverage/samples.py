@@ -13,7 +13,7 @@ from standoff.core.types import IntArray, TextArray
 from standoff.evaluation.beside_truth import BesideTruth, read_beside_truth
 from standoff.evaluation.coverage.site_frame import rests_on_reference, shared_turning
 from standoff.evaluation.matching import NOTHING
-from standoff.evaluation.paper.turning import Turning
+from standoff.evaluation.paper.corner_order import CornerOrder
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,7 +103,7 @@ def _pairs(beside: BesideTruth) -> PairSamples:
     )
 
 
-def _positions(beside: BesideTruth, turning: Turning) -> PositionSamples:
+def _positions(beside: BesideTruth, turning: CornerOrder) -> PositionSamples:
     truth, tracks, track_row, frames = beside.truth, beside.tracks, beside.track_row, beside.frames
     found = track_row != NOTHING
     rows = track_row[found]

@@ -10,7 +10,7 @@ import numpy as np
 
 from standoff.clips import read_scene
 from standoff.core.homography import FloatArray
-from standoff.evaluation.paper.turning import Turning
+from standoff.evaluation.paper.corner_order import CornerOrder
 from standoff.stages.ground import ReferenceShape
 
 _SAME_M = 1e-3
@@ -18,7 +18,7 @@ _BY_REFERENCE = ("fused", "refined", "reference:")
 """How the methods of maps begin that rest on the reference object; others have a site frame of their own."""
 
 
-def shared_turning(settings: Mapping[str, Any], clip: Path) -> Turning | None:
+def shared_turning(settings: Mapping[str, Any], clip: Path) -> CornerOrder | None:
     """Return what turns a run's places into the truth's; None where the two do not share their site frame.
 
     Args:
@@ -34,7 +34,7 @@ def shared_turning(settings: Mapping[str, Any], clip: Path) -> Turning | None:
     true_m = np.array(entry["top_m"], dtype=np.float64)[:, :2]
     if told_m.shape != true_m.shape or np.abs(told_m - true_m).max() > _SAME_M:
         return None
-    return Turning(ReferenceShape.from_corners(true_m), true_m)
+    return CornerOrder(ReferenceShape.from_corners(true_m), true_m)
 
 
 def _corners_told(settings: Mapping[str, Any]) -> FloatArray | None:

@@ -16,7 +16,7 @@ from standoff.core.homography import FloatArray
 from standoff.drawing.file_charts import INK, blank, colour_of, tidy
 from standoff.evaluation.detection.coco import HEIGHT_BANDS_PX
 from standoff.evaluation.detection.comparison import Comparison
-from standoff.evaluation.detection.trial import TrialResult
+from standoff.evaluation.detection.detector_trial import TrialResult
 
 _SIZED: Final = re.compile(r"(?P<network>.+?)[-_.](?P<size>\d+x\d+)(?P<slices> \d+x\d+)?")
 _SMALL: Final = HEIGHT_BANDS_PX.index((15.0, 30.0))

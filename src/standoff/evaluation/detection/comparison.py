@@ -7,8 +7,8 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from standoff.evaluation.detection.bootstrap import Chance, Interval, resample_groups
+from standoff.evaluation.detection.detector_trial import TrialResult
 from standoff.evaluation.detection.material import Material
-from standoff.evaluation.detection.trial import TrialResult
 from standoff.evaluation.timing import machine
 from standoff.labels.types import Problem
 

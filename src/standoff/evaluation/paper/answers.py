@@ -13,7 +13,7 @@ from standoff.config import Settings
 from standoff.core.classes import CLASSES
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import IntArray, TextArray
-from standoff.evaluation.paper.watch import Watched
+from standoff.evaluation.paper.monitored_clip import MonitoredClip
 
 ANSWERS = ("danger", "warning", "clear", "unknown")
 DANGER, WARNING, CLEAR, UNKNOWN = range(4)
@@ -191,16 +191,16 @@ def seen_together(clip: Clip) -> BoolArray:
     return visible[:, clip.pairs[:, 0]] & visible[:, clip.pairs[:, 1]]
 
 
-def score_frames(clip: Clip, watched: Watched, settings: Settings) -> FrameByFrame:
+def score_frames(clip: Clip, monitored: MonitoredClip, settings: Settings) -> FrameByFrame:
     """Score what was said of every visible pair in every frame."""
     asked = seen_together(clip) & (clip.distance_m <= UP_TO_M)
     radii_m, buffer_m = both_radii_m(clip, settings), settings.hazard.buffer_m
     true_gap_m = clip.distance_m - radii_m
-    true, measured = answers_of(true_gap_m, buffer_m), answers_of(watched.distance_m - radii_m, buffer_m)
-    said = np.where(measured == UNKNOWN, UNKNOWN, _as_said(watched.said))
+    true, measured = answers_of(true_gap_m, buffer_m), answers_of(monitored.distance_m - radii_m, buffer_m)
+    said = np.where(measured == UNKNOWN, UNKNOWN, _as_said(monitored.said))
     due = true
     if settings.hazard.rule == "probability":
-        due = answers_ahead_of(true_gap_m, watched.time_s, settings.proximity.horizon_s)
+        due = answers_ahead_of(true_gap_m, monitored.time_s, settings.proximity.horizon_s)
     told = asked & (due != UNKNOWN)
     return FrameByFrame(Answers.of(true[asked], measured[asked]), Answers.of(due[told], said[told]))
 

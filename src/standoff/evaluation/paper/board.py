@@ -11,7 +11,7 @@ from standoff.clips import Clip, TrueBoard
 from standoff.core.camera import Camera
 from standoff.core.homography import FloatArray
 from standoff.evaluation.checkerboard import CheckerboardResult, evaluate_views
-from standoff.evaluation.paper.watch import check_frame, open_clip_video
+from standoff.evaluation.paper.monitored_clip import check_frame, open_clip_video
 from standoff.evaluation.rectification import FAILURE_PX
 from standoff.stages.ground import BoardView, find_corners, load_camera
 
@@ -55,7 +55,7 @@ class BoardScore:
     misplaced: int
 
 
-def watch_board(clip: Clip, board: TrueBoard, on_frame: Callable[[], None] | None = None) -> list[BoardView]:
+def view_board(clip: Clip, board: TrueBoard, on_frame: Callable[[], None] | None = None) -> list[BoardView]:
     """Look for the board in every frame of the clip's video.
 
     Raises:

@@ -10,8 +10,8 @@ from standoff.core.homography import BoolArray
 from standoff.drawing.page_charts import INK, MUTED, inline_svg, themed_figure
 from standoff.drawing.palette import HEX
 from standoff.evaluation.paper.board import BoardScore
+from standoff.evaluation.paper.monitored_clip import MonitoredClip
 from standoff.evaluation.paper.pairs import PairSeries
-from standoff.evaluation.paper.watch import Watched
 from standoff.evaluation.rectification import FAILURE_PX
 
 ESTIMATE, RAW, TREND = HEX["worker"], HEX["warning"], HEX["machine"]
@@ -33,12 +33,12 @@ def pair_chart(series: PairSeries, paper_median_m: float | None = None) -> str:
         return inline_svg(figure)
 
 
-def corner_chart(watched: Watched, failed: BoolArray) -> str:
+def corner_chart(monitored: MonitoredClip, failed: BoolArray) -> str:
     """Draw the worst corner's error over the frames, on a logarithmic scale."""
     with themed_figure(10.0, 2.5) as figure:
         axes = figure.add_subplot()
         _shade(axes, failed)
-        worst_px = np.maximum(watched.corner_error_px.max(axis=1), 1e-3)
+        worst_px = np.maximum(monitored.corner_error_px.max(axis=1), 1e-3)
         frame = np.arange(len(worst_px))
         axes.semilogy(frame, worst_px, ".", markersize=_marker_size(len(frame)), color=ESTIMATE)
         axes.axhline(FAILURE_PX, color=HEX["danger"], linewidth=0.9, linestyle=(0, (5, 3)))

@@ -10,12 +10,12 @@ from standoff.clips import Clip, TrueReference
 from standoff.core.classes import CLASSES
 from standoff.core.homography import FloatArray
 from standoff.evaluation.paper.metrics import ale_m
-from standoff.evaluation.paper.watch import Watched
+from standoff.evaluation.paper.monitored_clip import MonitoredClip
 from standoff.stages.ground import ReferenceShape, rectified_scale_m_per_px
 
 
 @dataclass(frozen=True, slots=True)
-class ClassScore:
+class ClassLocalisation:
     """Localisation of one class; counts are frames of all its entities.
 
     Attributes:
@@ -48,26 +48,26 @@ def true_scale_m_per_px(reference: TrueReference) -> FloatArray:
     return np.array([rectified_scale_m_per_px(corners_px, shape) for corners_px in reference.corners_px])
 
 
-def score_localisation(clip: Clip, watched: Watched) -> tuple[ClassScore, ...]:
+def score_localisation(clip: Clip, monitored: MonitoredClip) -> tuple[ClassLocalisation, ...]:
     """Score every class that the clip shows."""
     assert clip.reference is not None
     scale = true_scale_m_per_px(clip.reference)
-    return tuple(_score_class(clip, watched, int(class_id), scale) for class_id in np.unique(clip.class_id))
+    return tuple(_score_class(clip, monitored, int(class_id), scale) for class_id in np.unique(clip.class_id))
 
 
-def _score_class(clip: Clip, watched: Watched, class_id: int, scale_m_per_px: FloatArray) -> ClassScore:
+def _score_class(clip: Clip, monitored: MonitoredClip, class_id: int, scale_m_per_px: FloatArray) -> ClassLocalisation:
     own = clip.class_id == class_id
-    true_px, detected_px = clip.box_px[:, own], watched.detected_px[:, own]
+    true_px, detected_px = clip.box_px[:, own], monitored.detected_px[:, own]
     visible = np.isfinite(true_px).all(axis=2)
     detected = visible & np.isfinite(detected_px).all(axis=2)
     scale = np.broadcast_to(scale_m_per_px[:, None], detected.shape)
     scored = detected & np.isfinite(scale)
-    located = visible & np.isfinite(watched.xy_m[:, own]).all(axis=2)
-    map_error_m = np.linalg.norm(watched.true_feet.xy_m[:, own] - clip.xy_m[:, own], axis=2)
+    located = visible & np.isfinite(monitored.xy_m[:, own]).all(axis=2)
+    map_error_m = np.linalg.norm(monitored.true_feet.xy_m[:, own] - clip.xy_m[:, own], axis=2)
     map_error_m = map_error_m[located & np.isfinite(map_error_m)]
-    error_m = np.linalg.norm(watched.xy_m[:, own] - clip.xy_m[:, own], axis=2)
+    error_m = np.linalg.norm(monitored.xy_m[:, own] - clip.xy_m[:, own], axis=2)
     error_m = error_m[located]
-    return ClassScore(
+    return ClassLocalisation(
         class_name=CLASSES[class_id].name,
         visible=int(visible.sum()),
         detected=int(detected.sum()),

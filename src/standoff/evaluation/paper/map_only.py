@@ -14,7 +14,7 @@ import numpy as np
 from standoff.clips import Clip
 from standoff.core.homography import FloatArray
 from standoff.evaluation.paper.mapped_points import MappedPoints
-from standoff.evaluation.paper.watch import Watched
+from standoff.evaluation.paper.monitored_clip import MonitoredClip
 from standoff.evaluation.stated_errors import plane_sigmas, plane_sigmas2_around
 
 NEAR_M = 20.0
@@ -87,12 +87,12 @@ class MapScore:
     uneven: MapFigures
 
 
-def map_samples(clip: Clip, watched: Watched, mapped: MappedPoints) -> MapSamples:
+def map_samples(clip: Clip, monitored: MonitoredClip, mapped: MappedPoints) -> MapSamples:
     """Collect the errors of one kind of points, of a clip with a reference object."""
     assert clip.reference is not None
     middle_m = clip.reference.corners_m.mean(axis=0)
     counts = np.linalg.norm(clip.xy_m - middle_m, axis=2) <= NEAR_M
-    counts &= np.isfinite(clip.box_px).all(axis=2) & np.isfinite(watched.scale_m_per_px)[:, None]
+    counts &= np.isfinite(clip.box_px).all(axis=2) & np.isfinite(monitored.scale_m_per_px)[:, None]
     measured = counts & np.isfinite(mapped.xy_m).all(axis=2)
     off_m = (mapped.xy_m - clip.xy_m)[measured]
     covariance_m2 = mapped.covariance_m2[measured]
@@ -124,17 +124,17 @@ def figures_of(samples: Sequence[MapSamples]) -> MapFigures:
     )
 
 
-def score_map(clip: Clip, watched: Watched) -> MapScore:
+def score_map(clip: Clip, monitored: MonitoredClip) -> MapScore:
     """Score the map of every frame, of a clip with a reference object."""
     assert clip.reference is not None
-    without = ~np.isfinite(watched.scale_m_per_px)
-    seen = clip.reference.inside(watched.size_px) & (clip.reference.visible_share > 0.0)
+    without = ~np.isfinite(monitored.scale_m_per_px)
+    seen = clip.reference.inside(monitored.size_px) & (clip.reference.visible_share > 0.0)
     since_seen = np.logical_or.accumulate(seen)
     return MapScore(
         frames=len(without),
         without_map=int(without.sum()),
         frames_since_seen=int(since_seen.sum()),
         without_map_since_seen=int((without & since_seen).sum()),
-        level=figures_of([map_samples(clip, watched, watched.level_feet)]),
-        uneven=figures_of([map_samples(clip, watched, watched.true_feet)]),
+        level=figures_of([map_samples(clip, monitored, monitored.level_feet)]),
+        uneven=figures_of([map_samples(clip, monitored, monitored.true_feet)]),
     )

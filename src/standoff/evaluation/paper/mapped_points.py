@@ -12,7 +12,7 @@ from standoff.core.homography import FloatArray
 from standoff.core.map_error import map_jacobian
 from standoff.core.pose import View
 from standoff.core.types import GroundMap
-from standoff.evaluation.paper.turning import Turning
+from standoff.evaluation.paper.corner_order import CornerOrder
 from standoff.stages.ground import load_camera
 
 
@@ -33,7 +33,7 @@ class MappedPoints:
         """Return arrays to be filled in."""
         return cls(np.full((frames, entities, 2), np.nan), np.full((frames, entities, 2, 2), np.nan))
 
-    def take(self, frame: int, points_px: FloatArray, ground: GroundMap, turning: Turning, turn: int) -> None:
+    def take(self, frame: int, points_px: FloatArray, ground: GroundMap, turning: CornerOrder, turn: int) -> None:
         """Map the points of a frame.
 
         Args:

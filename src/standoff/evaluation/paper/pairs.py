@@ -14,8 +14,8 @@ from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import TextArray
 from standoff.evaluation.paper.benchmark_polynomial import Benchmark, fit_benchmark
 from standoff.evaluation.paper.metrics import DistanceScore, fill_as_the_filter, score_distances
+from standoff.evaluation.paper.monitored_clip import MonitoredClip
 from standoff.evaluation.paper.rectified import failed_frames
-from standoff.evaluation.paper.watch import Watched
 from standoff.evaluation.stated_errors import Coverage, score_coverage
 from standoff.stages.proximity import ProximityParams
 
@@ -84,33 +84,33 @@ class PairGroup:
     missing_by_reason: Mapping[str, int]
 
 
-def pair_series(clip: Clip, watched: Watched, *, benchmark: bool) -> tuple[PairSeries, ...]:
+def pair_series(clip: Clip, monitored: MonitoredClip, *, benchmark: bool) -> tuple[PairSeries, ...]:
     """Take each pair's distances out of what the monitor said."""
     assert clip.reference is not None
     names = clip.names()
-    failed = failed_frames(watched, clip.reference)
+    failed = failed_frames(monitored, clip.reference)
     return tuple(
-        _one_series(clip, watched, (names[ends[0]], names[ends[1]]), column, failed, benchmark)
+        _one_series(clip, monitored, (names[ends[0]], names[ends[1]]), column, failed, benchmark)
         for column, ends in enumerate(clip.pairs)
     )
 
 
 def _one_series(
     clip: Clip,
-    watched: Watched,
+    monitored: MonitoredClip,
     names: tuple[str, str],
     column: int,
     failed: BoolArray,
     benchmark: bool,
 ) -> PairSeries:
     first, second = clip.pairs[column].tolist()
-    before_m = np.linalg.norm(watched.xy_m[:, first] - watched.xy_m[:, second], axis=1)
-    after_m = watched.distance_m[:, column]
-    one, other = watched.reason[:, first], watched.reason[:, second]
+    before_m = np.linalg.norm(monitored.xy_m[:, first] - monitored.xy_m[:, second], axis=1)
+    after_m = monitored.distance_m[:, column]
+    one, other = monitored.reason[:, first], monitored.reason[:, second]
     reason = np.where(one != "", one, other)
     reason[np.isnan(after_m) & (reason == "")] = NOT_MEASURED
     reason[np.isnan(clip.distance_m[:, column])] = ""
-    raw_m = np.linalg.norm(watched.annotated_m[:, first] - watched.annotated_m[:, second], axis=1)
+    raw_m = np.linalg.norm(monitored.annotated_m[:, first] - monitored.annotated_m[:, second], axis=1)
     threshold_px = ProximityParams().outlier_threshold_px
     assert threshold_px is not None
     return PairSeries(
@@ -119,11 +119,11 @@ def _one_series(
         truth_m=clip.distance_m[:, column],
         before_m=before_m,
         after_m=after_m,
-        sigma_m=watched.sigma_m[:, column],
-        filled_m=fill_as_the_filter(after_m, failed & ~np.isfinite(watched.scale_m_per_px)),
+        sigma_m=monitored.sigma_m[:, column],
+        filled_m=fill_as_the_filter(after_m, failed & ~np.isfinite(monitored.scale_m_per_px)),
         failed=failed,
         reason=reason,
-        benchmark=fit_benchmark(raw_m, threshold_px * watched.scale_m_per_px) if benchmark else None,
+        benchmark=fit_benchmark(raw_m, threshold_px * monitored.scale_m_per_px) if benchmark else None,
     )
 
 

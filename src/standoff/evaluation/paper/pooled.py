@@ -58,11 +58,11 @@ def pool(results: Sequence[ClipResult]) -> PooledMap | None:
     clips = [
         _OfClip(
             np.array([one.without_map, one.frames, one.without_map_since_seen, one.frames_since_seen], np.float64),
-            map_samples(result.clip, watched, watched.level_feet),
-            map_samples(result.clip, watched, watched.true_feet),
+            map_samples(result.clip, monitored, monitored.level_feet),
+            map_samples(result.clip, monitored, monitored.true_feet),
         )
         for result in results
-        if (watched := result.watched) is not None and (one := result.map_only) is not None
+        if (monitored := result.monitored) is not None and (one := result.map_only) is not None
     ]
     if not clips:
         return None

@@ -10,7 +10,7 @@ import numpy as np
 
 from standoff.clips import TrueReference
 from standoff.core.homography import BoolArray, FloatArray
-from standoff.evaluation.paper.watch import WRONG, Watched, is_wrong
+from standoff.evaluation.paper.monitored_clip import WRONG, MonitoredClip, is_wrong
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,16 +44,16 @@ class RectificationScore:
     median_s: float
 
 
-def score_rectification(watched: Watched, reference: TrueReference) -> RectificationScore:
+def score_rectification(monitored: MonitoredClip, reference: TrueReference) -> RectificationScore:
     """Count failures and measure the corners."""
-    error_px = watched.corner_error_px
-    has_map = np.isfinite(watched.scale_m_per_px)
-    wrong = wrong_frames(watched)
-    right = has_map & ~wrong & ~watched.carried
-    failed = failed_frames(watched, reference)
-    judged = has_map & ~watched.carried
+    error_px = monitored.corner_error_px
+    has_map = np.isfinite(monitored.scale_m_per_px)
+    wrong = wrong_frames(monitored)
+    right = has_map & ~wrong & ~monitored.carried
+    failed = failed_frames(monitored, reference)
+    judged = has_map & ~monitored.carried
     out_of_sight = ~right & ~failed
-    reasons = np.where(wrong, WRONG, watched.no_map)[failed]
+    reasons = np.where(wrong, WRONG, monitored.no_map)[failed]
     looked_for = int((~out_of_sight).sum())
     return RectificationScore(
         frames=len(has_map),
@@ -65,24 +65,24 @@ def score_rectification(watched: Watched, reference: TrueReference) -> Rectifica
         corner_rmse_px=_root_mean_square(error_px[right]),
         worst_corner_px=float(np.max(error_px[judged])) if judged.any() else float("nan"),
         within_share=float(right.sum()) / looked_for if looked_for else float("nan"),
-        median_s=float(np.median(watched.ground_s)),
+        median_s=float(np.median(monitored.ground_s)),
     )
 
 
-def failed_frames(watched: Watched, reference: TrueReference) -> BoolArray:
+def failed_frames(monitored: MonitoredClip, reference: TrueReference) -> BoolArray:
     """Return (F,) which frames have a wrong map, or none although the reference is in sight."""
-    in_sight = reference.inside(watched.size_px) & (reference.visible_share > 0.0)
-    return wrong_frames(watched) | (~np.isfinite(watched.scale_m_per_px) & in_sight)
+    in_sight = reference.inside(monitored.size_px) & (reference.visible_share > 0.0)
+    return wrong_frames(monitored) | (~np.isfinite(monitored.scale_m_per_px) & in_sight)
 
 
-def wrong_frames(watched: Watched) -> BoolArray:
+def wrong_frames(monitored: MonitoredClip) -> BoolArray:
     """Return (F,) which frames have a map that should not have been believed.
 
     Where the reference is outside the picture, pixels of its corners do not tell: the map is judged on the ground.
     """
-    has_map = np.isfinite(watched.scale_m_per_px) & ~watched.carried
+    has_map = np.isfinite(monitored.scale_m_per_px) & ~monitored.carried
     return np.array(
-        [mapped and is_wrong(error) for mapped, error in zip(has_map, watched.corner_error_px, strict=True)]
+        [mapped and is_wrong(error) for mapped, error in zip(has_map, monitored.corner_error_px, strict=True)]
     )
 
 

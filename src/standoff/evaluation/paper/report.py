@@ -65,7 +65,7 @@ def render(results: Sequence[ClipResult], failures: Mapping[str, Exception]) -> 
         version=__version__,
         written_at=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         css=Markup(css),
-        trial=results[0].trial.describe(),
+        setup=results[0].setup.describe(),
         clips=[_section(result) for result in results],
         colours={"estimate": ESTIMATE, "raw": RAW, "trend": TREND},
         failures=failures,
@@ -83,16 +83,16 @@ def render(results: Sequence[ClipResult], failures: Mapping[str, Exception]) -> 
 
 def _section(result: ClipResult) -> dict[str, Any]:
     """Return what the template needs for one clip."""
-    watched, snapshots = result.watched, result.watched.snapshots if result.watched else None
+    monitored, snapshots = result.monitored, result.monitored.snapshots if result.monitored else None
     charted = sorted(result.series, key=_unmeasured_and_far)[:MOST_CHARTS]
     corners = ""
-    if watched is not None and result.clip.reference is not None:
-        corners = corner_chart(watched, failed_frames(watched, result.clip.reference))
+    if monitored is not None and result.clip.reference is not None:
+        corners = corner_chart(monitored, failed_frames(monitored, result.clip.reference))
     return {
         "name": result.clip.name,
         "preset": result.clip.preset,
         "frames": result.clip.frame_count,
-        "size_px": watched.size_px if watched else None,
+        "size_px": monitored.size_px if monitored else None,
         "figures": result.figures(),
         "rectification": result.rectification,
         "map_only": result.map_only,

@@ -11,9 +11,11 @@ import numpy as np
 
 from standoff.clips import Clip
 from standoff.evaluation.paper.answers import FrameByFrame, score_frames
-from standoff.evaluation.paper.board import BoardScore, score_board, watch_board
-from standoff.evaluation.paper.localisation import ClassScore, score_localisation
+from standoff.evaluation.paper.board import BoardScore, score_board, view_board
+from standoff.evaluation.paper.localisation import ClassLocalisation, score_localisation
 from standoff.evaluation.paper.map_only import MapScore, score_map
+from standoff.evaluation.paper.monitor_setup import MonitorSetup, settings_for
+from standoff.evaluation.paper.monitored_clip import MonitoredClip, monitor_clip
 from standoff.evaluation.paper.pairs import (
     AFTER,
     AGAINST_BENCHMARK,
@@ -26,9 +28,7 @@ from standoff.evaluation.paper.pairs import (
 )
 from standoff.evaluation.paper.published import BENCHMARK_PRESETS, PUBLISHED
 from standoff.evaluation.paper.rectified import RectificationScore, score_rectification
-from standoff.evaluation.paper.trial import Trial, settings_for
 from standoff.evaluation.paper.warning_time import Breach, find_breaches
-from standoff.evaluation.paper.watch import Watched, watch
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,8 +67,8 @@ class ClipResult:
 
     Attributes:
         clip: The truth.
-        trial: What was tried.
-        watched: What the monitor said; None for a clip without a reference object.
+        setup: What was tried.
+        monitored: What the monitor said; None for a clip without a reference object.
         rectification: None without a reference object.
         map_only: The ground map alone; None without a reference object.
         localisation: By class.
@@ -80,11 +80,11 @@ class ClipResult:
     """
 
     clip: Clip
-    trial: Trial
-    watched: Watched | None = None
+    setup: MonitorSetup
+    monitored: MonitoredClip | None = None
     rectification: RectificationScore | None = None
     map_only: MapScore | None = None
-    localisation: tuple[ClassScore, ...] = ()
+    localisation: tuple[ClassLocalisation, ...] = ()
     groups: tuple[PairGroup, ...] = ()
     series: tuple[PairSeries, ...] = ()
     answers: FrameByFrame | None = None
@@ -102,8 +102,8 @@ class ClipResult:
             "preset": self.clip.preset,
             "clip_seed": self.clip.seed,
             "frames": self.clip.frame_count,
-            "size_px": None if self.watched is None else list(self.watched.size_px),
-            "trial": self.trial.describe(),
+            "size_px": None if self.monitored is None else list(self.monitored.size_px),
+            "trial": self.setup.describe(),
             "paper": [asdict(figure) for figure in self.figures()],
             "rectification": None if self.rectification is None else asdict(self.rectification),
             "map_only": None if self.map_only is None else asdict(self.map_only),
@@ -115,33 +115,33 @@ class ClipResult:
         }
 
 
-def evaluate_clip(clip: Clip, trial: Trial, on_frame: Callable[[], None] | None = None) -> ClipResult:
+def evaluate_clip(clip: Clip, setup: MonitorSetup, on_frame: Callable[[], None] | None = None) -> ClipResult:
     """Run the paper's tests on one clip.
 
     Args:
         clip: From `load_clip`.
-        trial: What to try.
+        setup: What to try.
         on_frame: Called after each frame.
 
     Raises:
         StandoffError: The video, the model or the clip cannot be used.
     """
     if clip.board is not None:
-        return ClipResult(clip, trial, board=score_board(clip, clip.board, watch_board(clip, clip.board, on_frame)))
+        return ClipResult(clip, setup, board=score_board(clip, clip.board, view_board(clip, clip.board, on_frame)))
     assert clip.reference is not None, "checked in load_clip"
-    watched, settings = watch(clip, trial, on_frame), settings_for(clip, trial)
-    series = pair_series(clip, watched, benchmark=clip.preset in BENCHMARK_PRESETS)
+    monitored, settings = monitor_clip(clip, setup, on_frame), settings_for(clip, setup)
+    series = pair_series(clip, monitored, benchmark=clip.preset in BENCHMARK_PRESETS)
     return ClipResult(
         clip=clip,
-        trial=trial,
-        watched=watched,
-        rectification=score_rectification(watched, clip.reference),
-        map_only=score_map(clip, watched),
-        localisation=score_localisation(clip, watched),
+        setup=setup,
+        monitored=monitored,
+        rectification=score_rectification(monitored, clip.reference),
+        map_only=score_map(clip, monitored),
+        localisation=score_localisation(clip, monitored),
         groups=group_pairs(series),
         series=series,
-        answers=score_frames(clip, watched, settings),
-        breaches=find_breaches(clip, watched, settings),
+        answers=score_frames(clip, monitored, settings),
+        breaches=find_breaches(clip, monitored, settings),
     )
 
 

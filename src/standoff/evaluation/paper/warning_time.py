@@ -12,7 +12,7 @@ from standoff.config import Settings
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import IntArray
 from standoff.evaluation.paper.answers import both_radii_m, seen_together
-from standoff.evaluation.paper.watch import Watched
+from standoff.evaluation.paper.monitored_clip import MonitoredClip
 
 AHEAD_S = 2.0
 """So long before it a breach should be said: time to look up and take a step."""
@@ -57,7 +57,7 @@ class WarningTimes:
     foreseeable: int
 
 
-def find_breaches(clip: Clip, watched: Watched, settings: Settings) -> tuple[Breach, ...]:
+def find_breaches(clip: Clip, monitored: MonitoredClip, settings: Settings) -> tuple[Breach, ...]:
     """Find every true breach, and when the monitor first said so of it."""
     names = clip.names()
     together = seen_together(clip)
@@ -66,8 +66,8 @@ def find_breaches(clip: Clip, watched: Watched, settings: Settings) -> tuple[Bre
     for column, (first, second) in enumerate(clip.pairs.tolist()):
         for rows in _breached(gap_m[:, column]):
             if together[rows, column].any():
-                warned_s = warned_before_s(watched.time_s, watched.alarmed[:, column], rows)
-                start_s = float(watched.time_s[rows[0]])
+                warned_s = warned_before_s(monitored.time_s, monitored.alarmed[:, column], rows)
+                start_s = float(monitored.time_s[rows[0]])
                 found.append(Breach((names[first], names[second]), start_s, warned_s, from_start=bool(rows[0] == 0)))
     return tuple(sorted(found, key=lambda one: one.start_s))
 

@@ -19,7 +19,7 @@ _LARGEST_PROBABILITY: Final = 1.05
 """8-bit networks may round 1 up by a step."""
 
 _ROUNDING_PX: Final = 1.0
-"""Of corners in half precision, at 1920 px."""
+"""How far half precision may move a corner, at 1920 px."""
 
 LARGEST_PART: Final = 10.0
 """Boxes as parts of the input may reach beyond it, but not by this much; boxes in pixels do."""

@@ -23,7 +23,7 @@ from standoff.stages.detect.network import Network
 from standoff.stages.detect.params import DetectParams
 from standoff.stages.detect.point_network import PointNetwork
 from standoff.stages.detect.shipped import find_ground_points
-from standoff.stages.detect.slices import View, held_whole_px, view_share, views
+from standoff.stages.detect.slices import Slice, held_whole_px, view_share, views
 from standoff.stages.detect.suppression import join_cut, prefer_finer, suppress
 
 _CUT_MARGIN_INPUT_PX = 4.0
@@ -130,7 +130,7 @@ class OnnxDetector(protocols.Detector):
         detections = join_cut(detections[kept], is_cut[kept], params.cut_overlap)
         return suppress(detections, params.nms_iou, params.max_detections)
 
-    def _look(self, frame: Frame, view: View) -> tuple[Detections, BoolArray]:
+    def _look(self, frame: Frame, view: Slice) -> tuple[Detections, BoolArray]:
         """Detect in one view; tell which boxes its borders cut."""
         letterbox = self._network.letterbox((view.width_px, view.height_px))
         resized = _resized(frame, view, letterbox.inner_size_px)
@@ -173,7 +173,7 @@ class OnnxDetector(protocols.Detector):
         return suppress(found, self._iou_in_view, self._params.max_detections)
 
 
-def _resized(frame: Frame, view: View, size_px: tuple[int, int]) -> ImageArray:
+def _resized(frame: Frame, view: Slice, size_px: tuple[int, int]) -> ImageArray:
     if (view.width_px, view.height_px) == frame.size_px:
         return frame.picture.resized_bgr(*size_px)
     part = frame.image[view.top_px : view.top_px + view.height_px, view.left_px : view.left_px + view.width_px]

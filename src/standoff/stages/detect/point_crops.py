@@ -12,7 +12,7 @@ from standoff.core.homography import FloatArray
 from standoff.core.types import ImageArray, IntArray
 
 POINT_CROP_PX: Final = 96
-"""Side of what the network sees."""
+"""The network sees a square with sides of so many pixels."""
 POINT_CROP_AROUND: Final = 1.4
 """Side of the square in the picture, in longer sides of the box."""
 POINT_CLASSES: Final = tuple(one.name for one in CLASSES if one.role is not Role.REFERENCE)

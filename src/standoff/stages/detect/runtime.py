@@ -33,7 +33,7 @@ _AUTO: Final = ("cuda", "cpu")
 _ERRORS_ONLY: Final = 3
 _LONGEST_REASON: Final = 160
 _ZIP: Final = b"PK\x03\x04"
-"""So begin PyTorch's checkpoints."""
+"""PyTorch's checkpoints begin so, as all ZIP files do."""
 _TORCH_SUFFIXES: Final = (".pt", ".pth")
 _DARKNET_SUFFIX: Final = ".weights"
 # Its telemetry too where somebody else loaded it first, and of what it has to say only errors.

@@ -12,7 +12,7 @@ from standoff.core.homography import BoolArray, FloatArray
 
 
 @dataclass(frozen=True, slots=True)
-class View:
+class Slice:
     """A part of a frame, in whole pixels.
 
     Attributes:
@@ -51,7 +51,7 @@ def _starts_and_length(side_px: int, count: int, overlap: float) -> tuple[list[i
     return [(side_px - length_px) * number // max(1, count - 1) for number in range(count)], length_px
 
 
-def views(frame_size_px: tuple[int, int], slices: tuple[int, int], overlap: float) -> tuple[View, ...]:
+def views(frame_size_px: tuple[int, int], slices: tuple[int, int], overlap: float) -> tuple[Slice, ...]:
     """Lay a grid of overlapping slices over a frame.
 
     Args:
@@ -65,12 +65,12 @@ def views(frame_size_px: tuple[int, int], slices: tuple[int, int], overlap: floa
     >>> [(view.left_px, view.width_px) for view in views((1800, 900), (2, 1), 0.2)]
     [(0, 1800), (0, 1000), (800, 1000)]
     """
-    whole = View(0, 0, *frame_size_px, frame_size_px)
+    whole = Slice(0, 0, *frame_size_px, frame_size_px)
     if slices == (1, 1):
         return (whole,)
     lefts, width_px = _starts_and_length(frame_size_px[0], slices[0], overlap)
     tops, height_px = _starts_and_length(frame_size_px[1], slices[1], overlap)
-    return whole, *(View(left, top, width_px, height_px, frame_size_px) for top in tops for left in lefts)
+    return whole, *(Slice(left, top, width_px, height_px, frame_size_px) for top in tops for left in lefts)
 
 
 def view_share(slices: tuple[int, int], overlap: float) -> tuple[float, float]:

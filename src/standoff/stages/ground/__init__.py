@@ -5,7 +5,7 @@ from standoff.stages.ground.calibration import CalibrationResult, calibrate, cal
 from standoff.stages.ground.camera_file import load_camera, save_camera
 from standoff.stages.ground.edges import Edges, canny, sobel_gradients
 from standoff.stages.ground.fixed_camera import FixedCamera
-from standoff.stages.ground.fused import FusedGround
+from standoff.stages.ground.fused_ground import FusedGround
 from standoff.stages.ground.lines import line_through, ransac_contours, sample_pairs
 from standoff.stages.ground.marker_family import MARKER_FAMILIES, MarkerFamily, marker_pattern
 from standoff.stages.ground.marker_observer import MarkerObserver
@@ -18,6 +18,7 @@ from standoff.stages.ground.point_fit import belief_from_points, fit_points
 from standoff.stages.ground.pose_map import map_from_view
 from standoff.stages.ground.quadrilateral import Quadrilateral
 from standoff.stages.ground.reference import ReferenceGround, rectified_scale_m_per_px
+from standoff.stages.ground.reference_place import GivenPlace
 from standoff.stages.ground.scale_watch import ScaleWatch
 from standoff.stages.ground.shape import ReferenceShape
 from standoff.stages.ground.size_scale import scale_from_sizes, unit_hint
@@ -25,10 +26,9 @@ from standoff.stages.ground.sizes import SizesEstimator
 from standoff.stages.ground.solid_fit import Belief
 from standoff.stages.ground.solid_observer import Reference
 from standoff.stages.ground.survey_file import load_survey
-from standoff.stages.ground.surveyed import SurveyedGround
+from standoff.stages.ground.surveyed_ground import SurveyedGround
 from standoff.stages.ground.telemetry_pose import TelemetryPose, view_from_telemetry
 from standoff.stages.ground.unmapped import Unmapped
-from standoff.stages.ground.where import GivenPlace
 
 __all__ = [
     "MARKER_FAMILIES",

@@ -66,7 +66,7 @@ BETTER: Mapping[str, str] = {
     "telemetry": "a printed marker or a reference object of known size makes it better",
     "sizes": "a printed marker, a reference object of known size or the drone's log makes it better",
 }
-"""By what the most maps were found."""
+"""What would make the lengths better, by what found the most maps."""
 
 
 def expectation(sigma: float) -> str:

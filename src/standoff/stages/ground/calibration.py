@@ -23,7 +23,7 @@ _Float32Array = npt.NDArray[np.float32]
 
 _FEWEST_VIEWS = 3
 _LEAST_COMMON = 2.0 / 3.0
-"""Of the photographs have one size, or nobody knows which of two cameras is meant."""
+"""So large a share of the photographs must have one size, or nobody knows which of two cameras is meant."""
 _STOP = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 300, 1e-14)
 """OpenCV's own 30 rounds end on the way where the lens's axis is far from the middle: 0.4 px off with exact corners."""
 _LARGEST_RMS_PX, _LARGEST_RMS = 1.0, 1e-3
@@ -35,9 +35,9 @@ _FISHEYE_RAD = 0.7
 _SQUARE = 0.03
 """The pixels of nearly all cameras are square to a thousandth; what a calibration says of them to half a hundredth."""
 _FARTHEST_AXIS = 0.2
-"""From the middle of the picture, as a share of its side: photographs measured so far have 0.04 at most."""
+"""A lens's axis is at most this share of a side off the middle: photographs measured so far have 0.04 at most."""
 _LEAST_COVERED = 0.3
-"""Of the picture, by the hull of all corners: 13 photographs that make a good camera cover 0.46."""
+"""The hull of all corners must cover this share of the picture: 13 photographs that make a good camera cover 0.46."""
 _FEWER_COEFFICIENTS = (0, cv2.CALIB_FIX_K3, cv2.CALIB_FIX_K3 | cv2.CALIB_FIX_K2)
 """Where boards lie in the picture's middle only, the higher ones are noise."""
 # Parallel boards leave the focal length open (Zhang 2000, section 3.2), and OpenCV's standard error does not show it.

@@ -28,7 +28,7 @@ _NEWS = 0.9
 
 
 @dataclass(eq=False)
-class Moment:
+class FrameEvidence:
     """One frame, and what has been learned about it so far.
 
     Attributes:
@@ -124,10 +124,10 @@ class CameraBelief:
         """Take the lens that something of known size was seen through for likely, whatever was stated."""
         self._prior = replace(CameraPrior.unknown(camera.width_px, camera.height_px), camera=camera)
 
-    def predict(self, moment: Moment) -> None:
-        """Carry the belief to a frame by motion, and learn from it of the lens; the moment is then held."""
-        moment.held = self._filter.predict(moment.frame.time_s, moment.motion)
-        told = moment.motion.distortion if isinstance(moment.motion, CameraMotion) else None
+    def predict(self, evidence: FrameEvidence) -> None:
+        """Carry the belief to a frame by motion, and learn from it of the lens; the view is then held."""
+        evidence.held = self._filter.predict(evidence.frame.time_s, evidence.motion)
+        told = evidence.motion.distortion if isinstance(evidence.motion, CameraMotion) else None
         # What the motion tells is the k1 of another kind of lens than a fisheye.
         if told is None or self._prior.camera.lens == "fisheye":
             return
@@ -150,28 +150,28 @@ class CameraBelief:
         gradient[LENS] = -2.0 * own_k1, ratio**2
         self._filter.correct_lens(gradient, news.k1 - own_k1, news.sigma)
 
-    def correct(self, state: SolidState, information: FloatArray, by: str, moment: Moment) -> None:
-        """Take in an observation, as `PoseFilter.correct`; the moment is then held."""
+    def correct(self, state: SolidState, information: FloatArray, by: str, evidence: FrameEvidence) -> None:
+        """Take in an observation, as `PoseFilter.correct`; the view is then held."""
         self._filter.correct(state, information, by)
-        moment.held = True
+        evidence.held = True
 
     def begin(
         self,
         source: Source,
         belief: Belief,
-        moment: Moment,
+        evidence: FrameEvidence,
         *,
         frame_of: str,
         keeper: str = "",
         height_known: bool = True,
         doubt: FloatArray | None = None,
     ) -> None:
-        """Begin, or begin again; the moment is then held.
+        """Begin, or begin again; the view is then held.
 
         Args:
             source: What the belief rests on.
             belief: About the camera, in the site frame.
-            moment: The frame.
+            evidence: The frame.
             frame_of: Whose the site frame is.
             keeper: Name of the reference whose height is the belief's.
             height_known: Whether that was measured by hand.
@@ -181,8 +181,8 @@ class CameraBelief:
         by = keeper or source
         self._filter.start(
             belief,
-            moment.frame.time_s,
-            moment.motion,
+            evidence.frame.time_s,
+            evidence.motion,
             height_known=height_known,
             lasting_share=lasting_share,
             by=by,
@@ -191,21 +191,21 @@ class CameraBelief:
         if frame_of != self.frame_of:
             self.site_frame += 1
         self.source, self.keeper, self.frame_of = source, keeper, frame_of
-        moment.held = True
+        evidence.held = True
         self.begun_sigma = self.length_sigma
 
-    def begin_in_old_frame(self, source: Source, view: View, covariance: FloatArray, moment: Moment) -> None:
+    def begin_in_old_frame(self, source: Source, view: View, covariance: FloatArray, evidence: FrameEvidence) -> None:
         """Begin with a view in whose frame nothing is marked on the ground: the frame so far goes on, if there is one.
 
         Args:
             source: What it rests on.
             view: The camera.
             covariance: (8, 8) of a change of it.
-            moment: The frame.
+            evidence: The frame.
         """
         frame_of: str = source
         if self.now is not None:
             frame_of = self.frame_of
             if source != frame_of:
                 view = in_frame_of(view, self.now.state.view)
-        self.begin(source, belief_of(view, covariance), moment, frame_of=frame_of)
+        self.begin(source, belief_of(view, covariance), evidence, frame_of=frame_of)

@@ -18,7 +18,7 @@ fisheye's whole circle even a small one in the picture's middle is longer."""
 _LONGEST: Final = 20.0
 """One that sees three degrees: the longest zooms of drones see four."""
 _MOST_OBLONG: Final = 2.0
-"""Of pixels: anamorphic lenses and broadcast pictures stay below."""
+"""Pixels may be so much longer than high, or higher than long: anamorphic lenses and broadcast pictures stay below."""
 _CENTRAL: Final = 0.1
 """The lens's axis is no nearer to the picture's edge, as a share of its side."""
 _USUAL: Final = 0.1

@@ -11,7 +11,7 @@ from standoff.core import homography, protocols
 from standoff.core.homography import FloatArray
 from standoff.core.protocols import AnyGround, AnyMotion
 from standoff.core.types import CameraMotion, Detections, Frame, GroundMap, NoGroundMap
-from standoff.stages.ground.surveyed import SurveyedGround
+from standoff.stages.ground.surveyed_ground import SurveyedGround
 
 MOVED = "the camera has moved since the survey"
 OUT_OF_SIGHT = "the background of the survey is out of sight"
@@ -21,7 +21,7 @@ _STILL_SHARE, _STILL_PX = 0.0015, 1.5
 picture, coarsely coded."""
 
 _MOST_SHARE = 0.25
-"""Of the picture's width: beyond, much of what was surveyed has left the picture, and the map would be a guess."""
+"""The picture may have moved by this share of its width: beyond, the map would be a guess at what is no more in it."""
 
 _SURE_SHARE = 0.003
 """Of the picture's width: the standard error up to which a motion carries the map."""

@@ -9,7 +9,7 @@ from standoff.core.homography import FloatArray
 from standoff.core.pose import View
 from standoff.core.telemetry import Telemetry
 from standoff.core.types import NoGroundMap
-from standoff.stages.ground.camera_belief import CameraBelief, Moment
+from standoff.stages.ground.camera_belief import CameraBelief, FrameEvidence
 from standoff.stages.ground.params import FusedParams
 from standoff.stages.ground.pose_map import length_sigma
 from standoff.stages.ground.sizes_view import SizesView
@@ -36,11 +36,11 @@ class LastResorts:
         self._first: Telemetry | None = None
         self.most_people = 0
 
-    def ask(self, moment: Moment, belief: CameraBelief) -> list[str]:
+    def ask(self, evidence: FrameEvidence, belief: CameraBelief) -> list[str]:
         """Begin with what telemetry says where nothing as good is held; failing that, with the sizes of people.
 
         Args:
-            moment: The frame.
+            evidence: The frame.
             belief: About the camera.
 
         Returns:
@@ -49,44 +49,44 @@ class LastResorts:
         reasons: list[str] = []
         for used, ask in ((self._params.telemetry, self._read_telemetry), (self._params.sizes, self._compare_sizes)):
             if used:
-                reason = ask(moment, belief)
+                reason = ask(evidence, belief)
                 if reason is None:
                     return []
                 reasons.append(reason)
         return reasons
 
-    def _read_telemetry(self, moment: Moment, belief: CameraBelief) -> str | None:
+    def _read_telemetry(self, evidence: FrameEvidence, belief: CameraBelief) -> str | None:
         """Return None where telemetry says all that is needed, or why it does not."""
-        telemetry = moment.frame.telemetry
+        telemetry = evidence.frame.telemetry
         if telemetry is None:
             return ""
         own = belief.source == "telemetry"
-        if own and moment.held and belief.length_sigma <= _WORSE * belief.begun_sigma:
+        if own and evidence.held and belief.length_sigma <= _WORSE * belief.begun_sigma:
             return None
         self._first = telemetry if self._first is None else self._first
         read = telemetry_view(telemetry, self._first, belief.lens)
         if isinstance(read, NoGroundMap):
             return read.reason
         view, covariance = read
-        if moment.held and belief.by_landmark and length_sigma(view, covariance) >= belief.length_sigma:
+        if evidence.held and belief.by_landmark and length_sigma(view, covariance) >= belief.length_sigma:
             return None
-        belief.begin_in_old_frame("telemetry", view, covariance, moment)
+        belief.begin_in_old_frame("telemetry", view, covariance, evidence)
         return None
 
-    def _compare_sizes(self, moment: Moment, belief: CameraBelief) -> str | None:
+    def _compare_sizes(self, evidence: FrameEvidence, belief: CameraBelief) -> str | None:
         """Begin with the sizes of people, or begin again where they tell more than before; otherwise say why not."""
-        frame = moment.frame
+        frame = evidence.frame
         telemetry = frame.telemetry if self._params.telemetry else None
-        told = self._sizes.update(frame.time_s, moment.detections, moment.motion, telemetry)
+        told = self._sizes.update(frame.time_s, evidence.detections, evidence.motion, telemetry)
         if isinstance(told, NoGroundMap):
-            return None if moment.held and belief.source == "sizes" else told.reason
+            return None if evidence.held and belief.source == "sizes" else told.reason
         if told is None:
-            return None if moment.held else ""
+            return None if evidence.held else ""
         view, covariance = told
-        if moment.held and not _tells_more(view, covariance, belief):
+        if evidence.held and not _tells_more(view, covariance, belief):
             return None
         self.most_people = max(self.most_people, self._sizes.people)
-        belief.begin_in_old_frame("sizes", view, covariance, moment)
+        belief.begin_in_old_frame("sizes", view, covariance, evidence)
         return None
 
 

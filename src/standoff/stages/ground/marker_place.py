@@ -11,7 +11,7 @@ from standoff.core.errors import GroundError
 from standoff.core.homography import FloatArray
 
 _SQUARE_SHARE = 0.02
-"""By how much sides and diagonals may differ from a square's: a tape measure's error on site, not a mix-up."""
+"""Sides and diagonals may differ by so much from a square's: a tape measure's error on site, not a mix-up."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -23,7 +23,7 @@ from standoff.stages.ground.marker_family import MarkerFamily, corner_order, mar
 
 _LEAST_SIDE_PX = 10.0
 _LEAST_LIKENESS = 0.8
-"""Of the drawing and the picture; markers reach 0.85 at dusk, 0.94 otherwise, and nothing else comes near."""
+"""Drawing and picture must be so alike; markers reach 0.85 at dusk, 0.94 otherwise, and nothing else comes near."""
 
 _SIGMA_FACTOR = 2.0
 """What the drawing leaves unexplained is not independent from pixel to pixel, least of all after H.264, which also

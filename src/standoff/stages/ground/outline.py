@@ -11,7 +11,7 @@ from standoff.core.homography import FloatArray
 from standoff.core.types import ImageArray, NoGroundMap
 from standoff.stages.ground.edges import Edges, between_pixels, canny, sobel_gradients
 from standoff.stages.ground.lines import ransac_contours, refit, sample_pairs
-from standoff.stages.ground.oriented import noise_thresholds, oriented_lines
+from standoff.stages.ground.oriented_outline import noise_thresholds, oriented_lines
 from standoff.stages.ground.params import ReferenceParams
 from standoff.stages.ground.quadrilateral import (
     NO_QUADRILATERAL,

@@ -15,7 +15,7 @@ import numpy as np
 from standoff.core.homography import FloatArray
 from standoff.core.types import CameraMotion, NoCameraMotion
 from standoff.stages.ground.carry import carry, since
-from standoff.stages.ground.lasting import LastingErrors
+from standoff.stages.ground.lasting_errors import LastingErrors
 from standoff.stages.ground.solid import HEIGHT, STATE, SolidState
 from standoff.stages.ground.solid_fit import Belief
 

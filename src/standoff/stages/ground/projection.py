@@ -17,7 +17,7 @@ _UNDISTORT_ITERATIONS, _UNDISTORT_TOLERANCE, _UNDISTORTED = 50, 1e-12, 1e-9
 """Of Newton's method as in `Camera.undistort`, in normalised coordinates."""
 _FISHEYE = COEFFICIENTS["fisheye"]
 _CENTRE = 1e-12
-"""As in `standoff.core.distortion`."""
+"""Square of the radius below which quotients would lose their digits; the same as in `standoff.core.distortion`."""
 
 Eye = tuple[FloatArray, FloatArray, FloatArray, FloatArray, float]
 

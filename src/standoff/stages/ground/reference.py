@@ -13,13 +13,13 @@ from standoff.core.errors import GroundError
 from standoff.core.homography import FloatArray
 from standoff.core.types import CameraMotion, Detections, Frame, GroundMap, ImageArray, NoCameraMotion, NoGroundMap
 from standoff.stages.ground.basis import BETTER, reference_basis
+from standoff.stages.ground.box_follower import BoxFollower, moved_box
 from standoff.stages.ground.correspondence import camera_misfit_px, turn_from_before
-from standoff.stages.ground.follow import BoxFollower, moved_box
 from standoff.stages.ground.outline import OutlineFinder
 from standoff.stages.ground.params import ReferenceParams
 from standoff.stages.ground.quadrilateral import ORDERS, Quadrilateral
+from standoff.stages.ground.reference_place import NOT_SEEN, GivenPlace, detected_box
 from standoff.stages.ground.shape import ReferenceShape
-from standoff.stages.ground.where import NOT_SEEN, GivenPlace, detected_box
 
 LOST = "the reference is lost"
 IMPLAUSIBLE = "no camera could see the reference like this"

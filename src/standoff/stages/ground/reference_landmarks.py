@@ -9,17 +9,17 @@ import numpy as np
 
 from standoff.core.homography import FloatArray
 from standoff.core.types import NoGroundMap
-from standoff.stages.ground.beside import agrees_with_telemetry, with_telemetry
-from standoff.stages.ground.camera_belief import STATED, CameraBelief, Moment
+from standoff.stages.ground.camera_belief import STATED, CameraBelief, FrameEvidence
+from standoff.stages.ground.corner_order import doubt_between
 from standoff.stages.ground.lens_check import found_with_another_lens, refitted_lens
 from standoff.stages.ground.placement import Placement
 from standoff.stages.ground.pose_filter import Estimate
+from standoff.stages.ground.reference_matching import sort_out
 from standoff.stages.ground.solid import SolidState
 from standoff.stages.ground.solid_choice import NOT_THERE
 from standoff.stages.ground.solid_fit import Belief
 from standoff.stages.ground.solid_observer import Reference, SolidObserver
-from standoff.stages.ground.turned import doubt_between
-from standoff.stages.ground.which_box import sort_out
+from standoff.stages.ground.telemetry_agreement import agrees_with_telemetry, with_telemetry
 
 CONTRADICTED = "the reference looks otherwise than the drone's telemetry says"
 OTHERWISE = "a reference does not look as it must from where the camera is"
@@ -28,7 +28,7 @@ _DOUBTED_S = 2.0
 """For so long a reference that telemetry contradicts is not believed: what hides a part of it soon hides another."""
 
 _MOST_LENS_DOUBTS = 2
-"""Each costs a search."""
+"""So often at most the lens is doubted, because each doubt costs a search."""
 
 _MOVED_M, _MOVED_SIGMAS = 0.15, 4.0
 """A reference that is seen so far from where it stood has been moved."""
@@ -83,49 +83,49 @@ class ReferenceLandmarks:
         """Return the reference whose height is the belief's, if there is one."""
         return next((solid for solid in self._solids if solid.name == belief.keeper), None)
 
-    def look(self, moment: Moment, belief: CameraBelief) -> list[str]:
+    def look(self, evidence: FrameEvidence, belief: CameraBelief) -> list[str]:
         """Take in the references in the picture.
 
         Args:
-            moment: The frame.
+            evidence: The frame.
             belief: About the camera; begun or corrected here.
 
         Returns:
             Why those that were not taken in were not.
         """
-        now = belief.now if moment.held else None
+        now = belief.now if evidence.held else None
         if now is not None:
             for solid in self._solids:
-                solid.carry(now, moment.frame.time_s, keeps_height=_keeps_height(solid, belief))
+                solid.carry(now, evidence.frame.time_s, keeps_height=_keeps_height(solid, belief))
         lost = [solid for solid in self._solids if not solid.located]
-        if len(lost) > 1 and not (belief.by_landmark and moment.held):
-            reason = sort_out(lost, moment.gray, moment.detections, belief.lens)
+        if len(lost) > 1 and not (belief.by_landmark and evidence.held):
+            reason = sort_out(lost, evidence.gray, evidence.detections, belief.lens)
             if reason:
                 return [reason]
         reasons = []
         for solid in self._solids:
-            reason = self._look_at(solid, moment, belief)
+            reason = self._look_at(solid, evidence, belief)
             if reason:
                 reasons.append(reason)
                 self._why_unseen[solid.name] = reason
         return reasons
 
-    def _look_at(self, solid: SolidObserver, moment: Moment, belief: CameraBelief) -> str:
-        now, time_s = belief.now, moment.frame.time_s
+    def _look_at(self, solid: SolidObserver, evidence: FrameEvidence, belief: CameraBelief) -> str:
+        now, time_s = belief.now, evidence.frame.time_s
         if now is not None and belief.by_landmark:
-            seen = solid.look(moment.luma, now, held=moment.held, keeps_height=_keeps_height(solid, belief))
+            seen = solid.look(evidence.luma, now, held=evidence.held, keeps_height=_keeps_height(solid, belief))
             if seen is not None:
-                _take(solid, seen, moment, belief)
+                _take(solid, seen, evidence, belief)
                 return ""
         taken = [other.box for other in self._solids if other is not solid and other.box is not None]
-        held = belief.by_landmark and moment.held
-        telemetry = moment.frame.telemetry if self._telemetry else None
+        held = belief.by_landmark and evidence.held
+        telemetry = evidence.frame.telemetry if self._telemetry else None
         agrees = None if telemetry is None else partial(agrees_with_telemetry, telemetry=telemetry)
         found = solid.search(
-            moment.gray,
-            moment.frame.picture,
+            evidence.gray,
+            evidence.frame.picture,
             time_s,
-            moment.detections,
+            evidence.detections,
             belief.lens,
             held=held,
             taken=taken,
@@ -133,51 +133,53 @@ class ReferenceLandmarks:
         )
         if isinstance(found, NoGroundMap):
             if found.reason == NOT_THERE:
-                self._doubt_lens(moment, belief, solid)
+                self._doubt_lens(evidence, belief, solid)
             return found.reason
         own = solid.belief(found, time_s)
         doubt = doubt_between(own, found.alternatives, solid.reference.shape)
         outranks = solid.reference.place_known and belief.frame_of not in ("", STATED)
         if not held or outranks:
-            return self._begin(solid, own, doubt, moment, belief)
-        reason = _join(solid, own, moment, belief)
+            return self._begin(solid, own, doubt, evidence, belief)
+        reason = _join(solid, own, evidence, belief)
         alone = len(self._solids) == 1 and belief.source == "reference"
-        if reason and alone and solid.is_elsewhere(time_s, moment.detections):
+        if reason and alone and solid.is_elsewhere(time_s, evidence.detections):
             # What was believed began with a mistake.
-            return self._begin(solid, own, doubt, moment, belief)
+            return self._begin(solid, own, doubt, evidence, belief)
         return reason
 
-    def _doubt_lens(self, moment: Moment, belief: CameraBelief, solid: SolidObserver) -> None:
+    def _doubt_lens(self, evidence: FrameEvidence, belief: CameraBelief, solid: SolidObserver) -> None:
         """See whether another lens would explain a reference that is not found, a few times at most."""
-        box = solid.box_now(moment.frame.time_s, moment.detections, ())
+        box = solid.box_now(evidence.frame.time_s, evidence.detections, ())
         if isinstance(box, NoGroundMap) or belief.by_landmark or self._lens_doubts >= _MOST_LENS_DOUBTS:
             return
         self._lens_doubts += 1
-        text = found_with_another_lens(moment.gray, box, solid.reference.shape, belief.lens, solid.height)
+        text = found_with_another_lens(evidence.gray, box, solid.reference.shape, belief.lens, solid.height)
         if text:
-            belief.warnings.setdefault("lens", f"{text} ({moment.text})")
+            belief.warnings.setdefault("lens", f"{text} ({evidence.text})")
 
-    def _begin(self, solid: SolidObserver, own: Belief, doubt: FloatArray, moment: Moment, belief: CameraBelief) -> str:
+    def _begin(
+        self, solid: SolidObserver, own: Belief, doubt: FloatArray, evidence: FrameEvidence, belief: CameraBelief
+    ) -> str:
         """Begin the belief with what one reference shows; return why not, or ""."""
-        own, text = refitted_lens(moment.luma, solid.reference.shape, own, belief.lens)
+        own, text = refitted_lens(evidence.luma, solid.reference.shape, own, belief.lens)
         if text:
-            belief.warnings.setdefault("lens", f"{text} ({moment.text})")
+            belief.warnings.setdefault("lens", f"{text} ({evidence.text})")
             belief.doubt_lens(own.state.view.camera)
-        telemetry = moment.frame.telemetry
+        telemetry = evidence.frame.telemetry
         if self._telemetry and telemetry is not None:
             own, contradiction = with_telemetry(own, telemetry)
-            if contradiction and self._still_doubts(moment.frame.time_s):
+            if contradiction and self._still_doubts(evidence.frame.time_s):
                 return CONTRADICTED
             if contradiction:
-                text = f"{contradiction} ({moment.text}): {solid.name} is trusted, because its size was measured"
+                text = f"{contradiction} ({evidence.text}): {solid.name} is trusted, because its size was measured"
                 belief.warnings.setdefault("telemetry", text)
         frame_of = STATED if solid.reference.place_known else solid.name
         known = solid.reference.height_m is not None
         if frame_of != belief.frame_of or belief.now is None:
             self.forget_places()
-        belief.begin("reference", own, moment, frame_of=frame_of, keeper=solid.name, height_known=known, doubt=doubt)
+        belief.begin("reference", own, evidence, frame_of=frame_of, keeper=solid.name, height_known=known, doubt=doubt)
         solid.defines_frame()
-        moment.anchors_px.append(solid.note(own.state, moment.frame.time_s))
+        evidence.anchors_px.append(solid.note(own.state, evidence.frame.time_s))
         return ""
 
     def _still_doubts(self, time_s: float) -> bool:
@@ -198,14 +200,16 @@ def _keeps_height(solid: SolidObserver, belief: CameraBelief) -> bool:
     return solid.name == belief.keeper and solid.stands_still
 
 
-def _take(solid: SolidObserver, seen: tuple[SolidState, FloatArray], moment: Moment, belief: CameraBelief) -> None:
-    belief.correct(*seen, solid.name, moment)
+def _take(
+    solid: SolidObserver, seen: tuple[SolidState, FloatArray], evidence: FrameEvidence, belief: CameraBelief
+) -> None:
+    belief.correct(*seen, solid.name, evidence)
     now = belief.now
     assert now is not None
-    moment.anchors_px.append(solid.note_seen(now, moment.frame.time_s, keeps_height=_keeps_height(solid, belief)))
+    evidence.anchors_px.append(solid.note_seen(now, evidence.frame.time_s, keeps_height=_keeps_height(solid, belief)))
 
 
-def _join(solid: SolidObserver, own: Belief, moment: Moment, belief: CameraBelief) -> str:
+def _join(solid: SolidObserver, own: Belief, evidence: FrameEvidence, belief: CameraBelief) -> str:
     """Take in a reference that was found by a search while the camera's place is known; or say why not."""
     now = belief.now
     assert now is not None
@@ -216,14 +220,14 @@ def _join(solid: SolidObserver, own: Belief, moment: Moment, belief: CameraBelie
     moved_m = 0.0 if stood is None else placement.moved_by(stood, solid.reference.middle_m)
     if stood is None or moved_m > max(_MOVED_M, _MOVED_SIGMAS * solid.place_sigma_m(now)):
         if stood is not None:
-            belief.warnings.setdefault(f"{solid.name} moved", _moved(solid, moved_m, moment))
+            belief.warnings.setdefault(f"{solid.name} moved", _moved(solid, moved_m, evidence))
         if solid.name == belief.keeper:
             solid.remember_height(now)
         solid.stands(placement)
     keeps_height = _keeps_height(solid, belief)
-    seen = solid.look(moment.luma, now, held=True, keeps_height=keeps_height, found=own.state)
+    seen = solid.look(evidence.luma, now, held=True, keeps_height=keeps_height, found=own.state)
     if seen is not None:
-        _take(solid, seen, moment, belief)
+        _take(solid, seen, evidence, belief)
     return ""
 
 
@@ -235,7 +239,11 @@ def _agree(solid: SolidObserver, placement: Placement, own: Belief, now: Estimat
     return bool(off @ np.linalg.solve(spread, off) <= _MOST_CHI2)
 
 
-def _moved(solid: SolidObserver, moved_m: float, moment: Moment) -> str:
+def _moved(solid: SolidObserver, moved_m: float, evidence: FrameEvidence) -> str:
     if solid.was_seen:
-        return f"{solid.name} was moved by {moved_m:.1f} m before {moment.text}: the ground's picture tells places now"
-    return f"{solid.name} stands {moved_m:.1f} m from its stated place ({moment.text}): what was seen first is trusted"
+        return (
+            f"{solid.name} was moved by {moved_m:.1f} m before {evidence.text}: the ground's picture tells places now"
+        )
+    return (
+        f"{solid.name} stands {moved_m:.1f} m from its stated place ({evidence.text}): what was seen first is trusted"
+    )

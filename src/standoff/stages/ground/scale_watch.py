@@ -20,7 +20,7 @@ from standoff.stages.ground.size_scale import REFUSAL_FACTOR, WARNING_FACTOR, si
 _EVERY_S = 0.5
 _LEAST_SCORE = 0.6
 _MOST_SIZES = 120
-"""Of people, and of machines: what was seen last counts."""
+"""So many sizes of people, and as many of machines, are kept: what was seen last counts."""
 
 _FEWEST_ENTITIES, _FEWEST_TO_WARN, _FEWEST_TO_REFUSE = 2, 3, 8
 _ABSURD_FACTOR = 8.0

@@ -16,7 +16,7 @@ import numpy as np
 from standoff.core.homography import FloatArray
 from standoff.core.pose import poses_of_plane
 from standoff.core.types import IntArray
-from standoff.stages.ground.upright import log_sizes
+from standoff.stages.ground.upright_body import log_sizes
 
 STATURE_M = 1.78
 """Sole to the top of the hat of somebody 1.75 m tall, less what people bend a little while they work."""
@@ -29,17 +29,17 @@ _ARMS = 0.30
 """Arms and stride widen a box by a third, as a logarithm; how sure that is, is `_GLOBAL_SIGMA`'s third."""
 
 _GLOBAL_SIGMA = np.array([0.08 / STATURE_M, 0.15, 0.15, 1.0])
-"""Of what all people share: log stature (a crew's mean), log depth, log width, and how many
+"""Standard errors of what all people share: log stature (a crew's mean), log depth, log width, and how many
 pixels too large a detector draws."""
 
 _PERSON_SIGMA = np.array([0.07 / STATURE_M, 0.15])
-"""Of what one person keeps: log stature, log breadth."""
+"""Standard errors of what one person keeps: log stature, log breadth."""
 
 _NOISE = np.array([0.18, 0.07])
-"""Of one box's log width and log height beside the detector's pixels: stride, arms; posture."""
+"""Standard errors of one box's log width and log height beside the detector's pixels: stride, arms; posture."""
 
 _STRIDE = 0.13
-"""Of the log height of a box seen straight from above, by stride and posture; less from the side."""
+"""Standard error of the log height of a box seen straight from above, by stride and posture; less from the side."""
 
 _NOISE_PX = 1.0
 
@@ -58,7 +58,7 @@ K1_STEP = 0.01
 """How far from the likely k1 the second half of `BoxRows` is."""
 
 _STEPS = np.array([1e-4, 1e-4, 1e-4, 1e-4, K1_STEP])
-"""For derivatives by pitch, roll, log height, log focal length and k1."""
+"""How far each is changed to find derivatives: by pitch, roll, log height, log focal length and k1."""
 
 _FAR_OFF = 0.5
 """Logarithm of how far an expected size may be from the observed one before it is not believed any more."""

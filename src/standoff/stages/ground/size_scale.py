@@ -13,7 +13,7 @@ from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.pose import View, view_from_homography
 from standoff.core.types import GroundMap, IntArray
 from standoff.stages.ground.size_fit import BODY_M, STATURE_M
-from standoff.stages.ground.upright import log_sizes
+from standoff.stages.ground.upright_body import log_sizes
 
 WARNING_FACTOR = 1.6
 """Sizes this many times too large or too small are worth a warning: no crew and no fleet is."""
@@ -30,7 +30,7 @@ _OTHER_FILL = 0.9
 """A machine's box is smaller than its block's: corners are rounded off, and a boom is seldom stretched out."""
 
 _ENTITY_SIGMA = {Role.PERSON: 0.10, Role.EQUIPMENT: 0.20}
-"""Of one entity against its class: posture and stature; heading and kind."""
+"""Standard error of the log size of one entity against its class: by posture and stature, or by heading and kind."""
 
 _LOOSE_PX = 1.5
 """How many pixels too large or too small a detector's boxes are."""

@@ -23,7 +23,7 @@ NOT_A_PLANE = "the sizes of people do not fit one level ground"
 
 _EVERY_S = 0.45
 _LEAST_SCORE = 0.6
-"""Of a box that is taken for a person: below, clutter is as frequent as people (the shipped detector)."""
+"""A box with this score is taken for a person: below, clutter is as frequent as people (the shipped detector)."""
 
 _FEWEST_PLACES = 5
 _FEWEST_STANDING, _WIDEST_SCATTER = 0.5, 0.3

@@ -17,7 +17,7 @@ STATE = CHANGES + 1
 """Parameters of a change of a `SolidState`: those of a view, then the solid's height (m)."""
 
 HEIGHT = CHANGES
-"""The height's place among them."""
+"""The height's place among the changes of a state: behind those of the view."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -50,7 +50,10 @@ _MOST_BRIGHTER: Final = 10.0
 
 _TOP_SHARE: Final = 0.5
 _SIGMA_WIDTHS: Final = 0.4
-"""Of a peak at half its height, chosen on the simulated clips of seeds 601 to 605 and 611 to 613."""
+"""Standard error of a peak's place, in its widths at half its height.
+
+Chosen on the simulated clips of seeds 601 to 605 and 611 to 613.
+"""
 
 _LEAST_SIGMA_M: Final = 0.05
 _MOST_SIGMA_M: Final = 0.2

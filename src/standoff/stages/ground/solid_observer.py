@@ -13,23 +13,23 @@ from standoff.core.camera import CameraPrior
 from standoff.core.homography import FloatArray
 from standoff.core.pose import View
 from standoff.core.types import Detections, ImageArray, Luma, NoGroundMap, Picture
+from standoff.stages.ground.corner_order import turned_like
 from standoff.stages.ground.params import ReferenceParams
 from standoff.stages.ground.placement import Placement, Through
 from standoff.stages.ground.pose_filter import Estimate
 from standoff.stages.ground.projection import project, project_with_jacobians
+from standoff.stages.ground.reference_place import NOT_SEEN, GivenPlace, detected_box
 from standoff.stages.ground.shape import ReferenceShape
 from standoff.stages.ground.solid import HEIGHT, SolidState
 from standoff.stages.ground.solid_choice import Found
 from standoff.stages.ground.solid_fit import Belief, fit_solid
 from standoff.stages.ground.solid_foot import with_foot
 from standoff.stages.ground.solid_search import HeightPrior, search_solid
-from standoff.stages.ground.turned import turned_like
-from standoff.stages.ground.where import NOT_SEEN, GivenPlace, detected_box
 
 _LEAST_REACH_PX, _MOST_REACH_PX = 5.0, 8.0
 _REACH_SIGMAS = 4.0
 _MIN_SUPPORT = 0.4
-"""Of the outline that should show, so much must be seen for the reference to count as seen in a frame."""
+"""So much of the outline that should show must be seen for the reference to count as seen in a frame."""
 
 _GATE_PX, _GATE_SIGMAS = 1.0, 4.0
 _SEARCH_AGAIN_S, _LOOK_ELSEWHERE_S = 0.19, 1.0
@@ -40,7 +40,7 @@ _MAX_REFUSED_S = 1.0
 """When a reference that can be seen has contradicted what is predicted for so long, it is searched for again."""
 
 _LEAST_FILLED = 0.65
-"""Of a detector's box, what is found in it covers so much, or it is something else in the box."""
+"""What is found in a detector's box covers so much of it, or it is something else in the box."""
 
 _MOST_ELSEWHERE = 0.5
 """Of a detector's box, so much at most may lie beside where the reference is believed to be: its sides do."""

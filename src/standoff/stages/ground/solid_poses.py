@@ -24,7 +24,7 @@ _MOST_ASPECT = 1.8
 """A box may be so many times too wide or too high for what is in it."""
 
 AROUND = 3.0
-"""So many times as far from the reference's middle as its corners."""
+"""The outer points lie so many times as far from the reference's middle as its corners."""
 
 _PLACED_ROUNDS = 3
 _NEAREST_M = 0.1

@@ -21,7 +21,7 @@ from standoff.core.pose import LENS, SHIFT, TURN, View
 from standoff.core.types import ImageArray, NoGroundMap
 from standoff.stages.ground.edge_field import EdgeField
 from standoff.stages.ground.edges import Edges, between_pixels, canny, sobel_gradients
-from standoff.stages.ground.oriented import likely_quadrilaterals, noise_thresholds
+from standoff.stages.ground.oriented_outline import likely_quadrilaterals, noise_thresholds
 from standoff.stages.ground.outline import BOX_OUTSIDE, TOO_FEW_EDGES, undistorted_box
 from standoff.stages.ground.shape import ReferenceShape
 from standoff.stages.ground.solid import HEIGHT, STATE, SolidState

@@ -33,7 +33,7 @@ from standoff.core.errors import GroundError
 from standoff.core.geographic import GeographicOrigin, likely_unit
 from standoff.core.homography import FloatArray
 from standoff.stages.ground.camera_file import load_camera
-from standoff.stages.ground.surveyed import SurveyedGround
+from standoff.stages.ground.surveyed_ground import SurveyedGround
 from standoff.stages.ground.yaml_file import check_keys, numbers, read_mapping
 
 _WHAT = "a survey file"

@@ -6,9 +6,9 @@ import numpy as np
 
 from standoff.core.errors import GroundError
 from standoff.core.types import NoGroundMap
-from standoff.stages.ground.camera_belief import Moment
+from standoff.stages.ground.camera_belief import FrameEvidence
 from standoff.stages.ground.observation import PointObservation
-from standoff.stages.ground.surveyed import SurveyedGround
+from standoff.stages.ground.surveyed_ground import SurveyedGround
 
 NOT_YET = "the picture of the surveyed points has not come yet"
 SURVEYED = "the surveyed points"
@@ -47,9 +47,9 @@ class SurveyObserver:
         self._pending = True
         self.missed = ""
 
-    def observe(self, moment: Moment) -> list[PointObservation] | NoGroundMap:
+    def observe(self, evidence: FrameEvidence) -> list[PointObservation] | NoGroundMap:
         """Return the surveyed points in the frame that they were read from; in all others, why there are none."""
-        time_s, wanted_s = moment.frame.time_s, self.survey.time_s
+        time_s, wanted_s = evidence.frame.time_s, self.survey.time_s
         if not self._pending:
             return NoGroundMap(self.missed)
         if wanted_s is not None and time_s < wanted_s - _SAME_TIME_S:
@@ -58,6 +58,6 @@ class SurveyObserver:
         if wanted_s is not None and time_s > wanted_s + _SAME_TIME_S:
             self.missed = f"{MISSED}: it is at {wanted_s:g} s, the next one at {time_s:.2f} s"
             return NoGroundMap(self.missed)
-        points_px, sigma_px = self.survey.points_in(moment.frame.size_px)
+        points_px, sigma_px = self.survey.points_in(evidence.frame.size_px)
         points_m = self.survey.points_in_plane()
         return [PointObservation(SURVEYED, points_m, points_px, np.full(len(points_px), sigma_px))]

@@ -27,7 +27,7 @@ _SIGMAS: Final = 5.0
 _ZOOM_LOG, _AXIS_SHARE = 0.025, 0.015
 """What is less is left to the lens's model: photographs of good sets differ by 0.013 and, of the longer side, 0.01."""
 _FEWEST_AWAY: Final = 0.25
-"""Of the photographs, must see the axis elsewhere."""
+"""At least this share of the photographs must see the axis elsewhere."""
 _ROUNDS: Final = 8
 _EXPLAINED: Final = 0.75
 """Of the distances between corners and where a lens puts them remain where what was done to photographs is undone."""

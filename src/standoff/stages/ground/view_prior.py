@@ -23,7 +23,7 @@ _HEIGHT_SIGMA_M = 1e-3
 """The belief's last entry is the height of a reference object, of which there is none here."""
 
 _FRAME_SIGMA = np.array([1e-4] * 3 + [1e-2] * 2 + [1e-4] * 3)
-"""Of what is certain because it says where the site frame is: without it the covariance had no inverse."""
+"""Standard errors of what is certain, as it says where the site frame is: without it the covariance had no inverse."""
 
 _LEVEL_SIGMA = np.sin(np.deg2rad(3.0))
 """A gimbal, and whoever sets up a camera, keeps the picture's lower edge level."""

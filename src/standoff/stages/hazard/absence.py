@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from standoff.core.types import Hazard
-from standoff.stages.hazard.life import Latch, StreamHazard
+from standoff.stages.hazard.latch import Latch, StreamHazard
 from standoff.stages.hazard.params import HazardParams
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from standoff.stages.hazard.life import Reading
+from standoff.stages.hazard.latch import Reading
+from standoff.stages.hazard.life_cycle import Limit
 from standoff.stages.hazard.params import HazardParams
-from standoff.stages.hazard.watch import Limit
 
 _RELEASE = 0.5
 """A level that a probability began ends at this share of it."""

@@ -12,12 +12,12 @@ from standoff.core.homography import BoolArray
 from standoff.core.types import GroundMap, GroundPositions, Hazard, NoGroundMap, Proximities, WatchedGround
 from standoff.core.zones import Zone
 from standoff.stages.hazard.absence import AbsenceWatch
-from standoff.stages.hazard.follow import FollowWatch
+from standoff.stages.hazard.alarm_load import AlarmLoad
+from standoff.stages.hazard.latch import NOT_MEASURED, NOT_WATCHED, TRACK_LOST, LastPhase, Reading
 from standoff.stages.hazard.levels import levels_of
-from standoff.stages.hazard.life import NOT_MEASURED, NOT_WATCHED, TRACK_LOST, LastPhase, Reading
-from standoff.stages.hazard.load import AlarmLoad
+from standoff.stages.hazard.life_cycle import HazardLifeCycle
 from standoff.stages.hazard.params import HazardParams
-from standoff.stages.hazard.watch import Watch
+from standoff.stages.hazard.unfollowed import UnfollowedHazard
 from standoff.stages.hazard.zone import ZoneRule
 
 Pair = tuple[int, int]
@@ -51,9 +51,9 @@ class HazardMonitor(protocols.HazardMonitor):
         self._params = params or HazardParams()
         self._given_zones = tuple(zones)
         self._map = AbsenceWatch(self._params, MAP_IS_BACK)
-        self._follow = FollowWatch(self._params)
+        self._follow = UnfollowedHazard(self._params)
         self._sight = AbsenceWatch(self._params, WATCHED_AGAIN)
-        self._pairs: dict[Pair, Watch] = {}
+        self._pairs: dict[Pair, HazardLifeCycle] = {}
         self._load = AlarmLoad()
         self._looked_s = math.inf
         self._zones = ZoneRule(self._given_zones, self._params)
@@ -94,7 +94,7 @@ class HazardMonitor(protocols.HazardMonitor):
         readings = _readings(proximities)
         reasons = dict(zip(positions.track_id.tolist(), positions.reason.tolist(), strict=True))
         for pair in sorted(self._pairs.keys() | readings.keys()):
-            watch = self._pairs.setdefault(pair, Watch("proximity", pair, self._params))
+            watch = self._pairs.setdefault(pair, HazardLifeCycle("proximity", pair, self._params))
             reading = readings.get(pair)
             if reading is None:
                 followed = reasons.keys() >= set(pair)
@@ -137,7 +137,7 @@ class HazardMonitor(protocols.HazardMonitor):
     def reset(self) -> None:
         """Forget everything without a word."""
         self._map = AbsenceWatch(self._params, MAP_IS_BACK)
-        self._follow = FollowWatch(self._params)
+        self._follow = UnfollowedHazard(self._params)
         self._sight = AbsenceWatch(self._params, WATCHED_AGAIN)
         self._pairs = {}
         self._load = AlarmLoad()

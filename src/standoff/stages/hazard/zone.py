@@ -13,10 +13,10 @@ from standoff.core.roles import ROLE_OF_CLASS
 from standoff.core.types import GroundMap, GroundPositions, Hazard, NoGroundMap
 from standoff.core.zones import NOT_PLACED, Zone
 from standoff.stages.hazard.absence import AbsenceWatch
-from standoff.stages.hazard.inside import probability_inside
-from standoff.stages.hazard.life import NOT_MEASURED, NOT_WATCHED, TRACK_LOST, UNMEASURED, LastPhase, Reading
+from standoff.stages.hazard.inside_zone import probability_inside
+from standoff.stages.hazard.latch import NOT_MEASURED, NOT_WATCHED, TRACK_LOST, UNMEASURED, LastPhase, Reading
+from standoff.stages.hazard.life_cycle import HazardLifeCycle, Limit
 from standoff.stages.hazard.params import HazardParams
-from standoff.stages.hazard.watch import Limit, Watch
 
 PLACED = "the zones can be found again"
 _HELP = "a survey, a marker, or a reference with first_corner_px would tell"
@@ -72,7 +72,7 @@ class ZoneRule:
         self._zones = sorted(zones, key=lambda zone: zone.name)
         self._params = params
         self._unplaced = AbsenceWatch(params, PLACED, "zone")
-        self._watches: dict[Key, Watch] = {}
+        self._watches: dict[Key, HazardLifeCycle] = {}
         self._last: dict[int, tuple[float, FloatArray]] = {}
         self._mapped_frames = self._unplaced_frames = 0
 
@@ -113,7 +113,7 @@ class ZoneRule:
             for key in sorted(of_zone | {(zone.name, tracks) for tracks, may_open in watched.items() if may_open}):
                 if key[1] in watched:
                     if key not in self._watches:
-                        self._watches[key] = Watch("zone", key[1], self._params, zone.name)
+                        self._watches[key] = HazardLifeCycle("zone", key[1], self._params, zone.name)
                     events.append(_follow(self._watches[key], time_s, [stands[track] for track in key[1]], rare))
                 else:
                     reason = NOT_WATCHED if alive >= set(key[1]) else TRACK_LOST
@@ -219,7 +219,7 @@ def _measured(zone: Zone, positions: GroundPositions) -> tuple[FloatArray, Float
     return gap_m, sigma_m, inside
 
 
-def _follow(watch: Watch, time_s: float, stands: list[_Stand], rare: bool) -> Hazard | None:
+def _follow(watch: HazardLifeCycle, time_s: float, stands: list[_Stand], rare: bool) -> Hazard | None:
     """Tell a watch of one or two what it watches; of two, what both share is as near as the one further out."""
     located = [one for one in stands if not one.reason]
     outside = [one for one in located if one.near.clear]

@@ -17,7 +17,7 @@ MIN_PAIRS = 8
 _ROUNDS = 5
 _TUKEY = 4.0
 _CONVERGED = 1e-5
-"""Of a step, in normalised coordinates: some thousandths of a pixel."""
+"""A step that is shorter ends the rounds, in normalised coordinates: some thousandths of a pixel."""
 
 _BEYOND = 1e3
 _PARAMETERS = 8

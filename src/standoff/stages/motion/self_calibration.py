@@ -14,7 +14,7 @@ from standoff.stages.motion.lens import Lens
 from standoff.stages.motion.plane import fit_plane
 
 _LEAST_MOTION: Final = 0.015
-"""Of the picture's width: where points moved less, on average, the errors of following them bend the picture more."""
+"""In the picture's width: where points moved less, on average, the errors of following them bend the picture more."""
 
 _ROUNDS: Final = 4
 _STEP: Final = 1e-3

@@ -2,11 +2,11 @@
 
 from standoff.core.watched_shares import percent_text
 from standoff.stages.sinks.folder import prepare_output
+from standoff.stages.sinks.frame_measurements import FrameMeasurements
 from standoff.stages.sinks.hazards import HazardSink
 from standoff.stages.sinks.make import Wanted, make_sink
 from standoff.stages.sinks.params import DrawParams, ReportParams, ShowParams, TableParams, VideoParams
 from standoff.stages.sinks.report import ReportSink
-from standoff.stages.sinks.scene import Scene
 from standoff.stages.sinks.tables import (
     DETECTIONS,
     FRAMES,
@@ -27,10 +27,10 @@ __all__ = [
     "ZONED_TRACKS",
     "Composer",
     "DrawParams",
+    "FrameMeasurements",
     "HazardSink",
     "ReportParams",
     "ReportSink",
-    "Scene",
     "ShowParams",
     "Table",
     "TableParams",

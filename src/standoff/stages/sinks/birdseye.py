@@ -13,8 +13,8 @@ from standoff.drawing.painter import Painter
 from standoff.drawing.palette import bgr
 from standoff.drawing.text import TextSprites
 from standoff.stages.sinks.fans import FAN_OPACITY
+from standoff.stages.sinks.frame_measurements import FrameMeasurements
 from standoff.stages.sinks.params import DrawParams
-from standoff.stages.sinks.scene import Scene
 from standoff.stages.sinks.shade import GroundShade, diagonals
 from standoff.stages.sinks.sketch import Sketch
 from standoff.stages.sinks.zone_drawing import ZoneDrawing
@@ -52,46 +52,46 @@ class BirdsEye:
             picture: The frame at any size, without drawings.
             sketch: What to draw.
         """
-        scene = sketch.scene
+        measurements = sketch.measurements
         panel[:] = self._backdrop
         painter = Painter(panel, self._text, self._params.size)
-        if isinstance(scene.ground, NoGroundMap):
-            _write_centred(painter, panel, ("NO GROUND MAP", scene.ground.reason))
+        if isinstance(measurements.ground, NoGroundMap):
+            _write_centred(painter, panel, ("NO GROUND MAP", measurements.ground.reason))
             return
-        self._choose_window(scene, scene.ground)
+        self._choose_window(measurements, measurements.ground)
         if self._window is None:
             _write_centred(painter, panel, ("NO GROUND IN SIGHT",))
             return
-        rectify(picture, scene.ground, self._window, panel)
+        rectify(picture, measurements.ground, self._window, panel)
         cv2.convertScaleAbs(panel, dst=panel, alpha=_DIMMED)
-        self._shade.draw(panel, sketch.cells, scene.ground, self._window)
+        self._shade.draw(panel, sketch.cells, measurements.ground, self._window)
         _draw_axes(painter, self._window)
         _draw_scale_bar(painter, panel, self._window, sketch.unit)
         window = self._window
-        zones = ZoneDrawing(scene, lambda rings_m: [window.to_window(ring) for ring in rings_m], window.size_px)
+        zones = ZoneDrawing(measurements, lambda rings_m: [window.to_window(ring) for ring in rings_m], window.size_px)
         zones.draw(painter)
         self._draw_entities(painter, sketch, window)
         if self._params.labels:
             zones.label(painter)
 
-    def _choose_window(self, scene: Scene, ground: GroundMap) -> None:
-        placed = scene.positions.xy_m[scene.positions.valid]
+    def _choose_window(self, measurements: FrameMeasurements, ground: GroundMap) -> None:
+        placed = measurements.positions.xy_m[measurements.positions.valid]
         if self._window is not None:
             if self._window.covers(placed).all():
-                self._all_inside_at_s = scene.time_s
-            if scene.time_s - self._all_inside_at_s <= _OUTSIDE_FOR_S:
+                self._all_inside_at_s = measurements.time_s
+            if measurements.time_s - self._all_inside_at_s <= _OUTSIDE_FOR_S:
                 return
         points = np.vstack([placed, seen_ground_m(ground)])
         if len(points):
             height, width = self._backdrop.shape[:2]
             self._window = window_around(points, (width, height), camera_up(ground), margin_m=6.0)
-            self._all_inside_at_s = scene.time_s
+            self._all_inside_at_s = measurements.time_s
 
     def _draw_entities(self, painter: Painter, sketch: Sketch, window: GroundWindow) -> None:
-        at = window.to_window(sketch.scene.positions.xy_m)
-        placed = sketch.scene.positions.valid
-        radii_px = sketch.scene.positions.radius_m / window.m_per_px
-        observed = sketch.scene.tracks.observed
+        at = window.to_window(sketch.measurements.positions.xy_m)
+        placed = sketch.measurements.positions.valid
+        radii_px = sketch.measurements.positions.radius_m / window.m_per_px
+        observed = sketch.measurements.tracks.observed
         if self._params.circles:
             for i in np.flatnonzero(placed).tolist():
                 outline = at[i] + radii_px[i] * _CIRCLE
@@ -113,7 +113,7 @@ class BirdsEye:
 
 def _label_dots(painter: Painter, sketch: Sketch, at_px: FloatArray, placed: BoolArray) -> None:
     for i in np.flatnonzero(placed).tolist():
-        text = str(sketch.scene.tracks.track_id[i])
+        text = str(sketch.measurements.tracks.track_id[i])
         width, height = painter.label_size_px(text)
         x, y = at_px[i].tolist()
         gap = 6 + 2 * painter.stroke_px

@@ -12,10 +12,10 @@ from standoff.core.lengths import UNITS
 from standoff.core.types import Frame, FrameResult, GroundMap, Hazard, ImageArray, NoGroundMap, Severity
 from standoff.core.zones import Zone
 from standoff.stages.sinks.blurring import PeopleWatch, blur
-from standoff.stages.sinks.moments import WorstMoments
+from standoff.stages.sinks.frame_measurements import FrameMeasurements
 from standoff.stages.sinks.params import ReportParams, ShowParams
-from standoff.stages.sinks.scene import Scene
 from standoff.stages.sinks.series import Series, Trail
+from standoff.stages.sinks.worst_moments import WorstMoments
 
 _MOST_HAZARDS = 5000
 _MOST_PATHS = 150
@@ -103,15 +103,15 @@ class RunSummary:
         if not self.stream_id:
             self.first_s, self.stream_id, self.size_px = frame.time_s, frame.stream_id, frame.size_px
         self.last_s = frame.time_s
-        scene = Scene.of(result, self.zones, self._people.update(result))
-        self._add_ground(frame, scene)
+        measurements = FrameMeasurements.of(result, self.zones, self._people.update(result))
+        self._add_ground(frame, measurements)
         # Of frames that share a sample the one with the least share is kept, as is the closest of a pair.
         self.watched_share.add(frame.time_s, result.watched.share, float("nan"), float("nan"))
-        names = scene.names()
-        self._add_paths(scene, names)
-        self._add_pairs(scene, names)
-        self._add_hazards(result.hazards, scene, names)
-        self.moments.offer(frame, scene)
+        names = measurements.names()
+        self._add_paths(measurements, names)
+        self._add_pairs(measurements, names)
+        self._add_hazards(result.hazards, measurements, names)
+        self.moments.offer(frame, measurements)
         measured = np.flatnonzero(np.isfinite(pairs.gap_m))
         if len(measured):
             k = measured[np.argmin(pairs.gap_m[measured])]
@@ -119,8 +119,8 @@ class RunSummary:
         else:
             self.site.add(frame.time_s, float("nan"), float("nan"), float("nan"))
 
-    def _add_ground(self, frame: Frame, scene: Scene) -> None:
-        ground = scene.ground
+    def _add_ground(self, frame: Frame, measurements: FrameMeasurements) -> None:
+        ground = measurements.ground
         if isinstance(ground, NoGroundMap):
             self.no_map.add(frame.time_s, float("nan"), float("nan"), float("nan"))
             return
@@ -131,11 +131,11 @@ class RunSummary:
             width = min(_BACKGROUND_WIDTH_PX, frame.size_px[0])
             height = round(width * frame.size_px[1] / frame.size_px[0])
             picture = frame.picture.resized_bgr(width, height).copy()
-            blur(picture, scene.hidden_px, np.array([0.0, 0.0, *frame.size_px]))
+            blur(picture, measurements.hidden_px, np.array([0.0, 0.0, *frame.size_px]))
             self.background = (picture, ground)
 
-    def _add_paths(self, scene: Scene, names: Mapping[int, str]) -> None:
-        tracks, xy_m = scene.tracks, scene.positions.xy_m.tolist()
+    def _add_paths(self, measurements: FrameMeasurements, names: Mapping[int, str]) -> None:
+        tracks, xy_m = measurements.tracks, measurements.positions.xy_m.tolist()
         rows = zip(tracks.track_id.tolist(), tracks.class_id.tolist(), xy_m, strict=True)
         for track_id, class_id, (x_m, y_m) in rows:
             if track_id not in self.paths:
@@ -145,8 +145,8 @@ class RunSummary:
             longest = sorted(self.paths, key=lambda track_id: len(self.paths[track_id]), reverse=True)
             self.paths = {track_id: self.paths[track_id] for track_id in sorted(longest[:_MOST_PATHS])}
 
-    def _add_pairs(self, scene: Scene, names: Mapping[int, str]) -> None:
-        pairs = scene.proximities
+    def _add_pairs(self, measurements: FrameMeasurements, names: Mapping[int, str]) -> None:
+        pairs = measurements.proximities
         keys = zip(pairs.track_a.tolist(), pairs.track_b.tolist(), strict=True)
         numbers = zip(pairs.gap_m.tolist(), pairs.distance_m.tolist(), pairs.sigma_m.tolist(), strict=True)
         for key, (gap_m, distance_m, sigma_m) in zip(keys, numbers, strict=True):
@@ -155,7 +155,7 @@ class RunSummary:
                     continue
                 self.pairs[key] = Series()
                 self.pair_names[key] = (names.get(key[0], str(key[0])), names.get(key[1], str(key[1])))
-            self.pairs[key].add(scene.time_s, gap_m, distance_m, sigma_m)
+            self.pairs[key].add(measurements.time_s, gap_m, distance_m, sigma_m)
 
     def _has_room(self, gap_m: float) -> bool:
         """Return whether a pair is close enough to be kept, and drop the farthest one for it."""
@@ -178,7 +178,7 @@ class RunSummary:
         closest = self.pairs[pair].closest
         return closest.gap_m if closest else float("inf")
 
-    def _add_hazards(self, events: Iterable[Hazard], scene: Scene, names: Mapping[int, str]) -> None:
+    def _add_hazards(self, events: Iterable[Hazard], measurements: FrameMeasurements, names: Mapping[int, str]) -> None:
         for event in events:
             if event.hazard_id not in self.hazards and len(self.hazards) < _MOST_HAZARDS:
                 called = tuple(names.get(track_id, f"track {track_id}") for track_id in event.track_ids)
@@ -186,11 +186,11 @@ class RunSummary:
                     event.rule, called, event.time_s, event.severity, zone=event.zone
                 )
             self.take_event(event)
-        pairs = scene.proximities
-        if not scene.hazards:
+        pairs = measurements.proximities
+        if not measurements.hazards:
             return
         for k, key in enumerate(zip(pairs.track_a.tolist(), pairs.track_b.tolist(), strict=True)):
-            hazard = scene.hazards.get(key)
+            hazard = measurements.hazards.get(key)
             if hazard is not None and hazard.hazard_id in self.hazards:
                 numbers = float(pairs.distance_m[k]), float(pairs.gap_m[k]), float(pairs.sigma_m[k])
                 self.hazards[hazard.hazard_id].measure(*numbers)

@@ -14,8 +14,8 @@ from standoff.drawing.painter import Painter
 from standoff.drawing.palette import Tone, bgr
 from standoff.drawing.text import TextSprites
 from standoff.stages.sinks.fans import FAN_OPACITY
+from standoff.stages.sinks.frame_measurements import ASSISTANCE
 from standoff.stages.sinks.params import DrawParams
-from standoff.stages.sinks.scene import ASSISTANCE
 from standoff.stages.sinks.shade import PictureShade
 from standoff.stages.sinks.sketch import Sketch
 from standoff.stages.sinks.zone_drawing import ZoneDrawing
@@ -54,32 +54,32 @@ class Overlay:
             region_px: (4,) left, top, right, bottom edges of the region that the canvas shows, in full-size
                 pixels; the whole frame by default.
         """
-        scene = sketch.scene
+        measurements = sketch.measurements
         painter = Painter(canvas, self._text, self._params.size)
         if region_px is None:
-            region_px = np.array([0.0, 0.0, *scene.size_px])
+            region_px = np.array([0.0, 0.0, *measurements.size_px])
         to_canvas = _ToCanvas(canvas, region_px)
         zones = None
-        self._shade.draw(canvas, sketch.cells, region_px / np.tile(scene.size_px, 2))
-        if words := scene.unknown_words():
+        self._shade.draw(canvas, sketch.cells, region_px / np.tile(measurements.size_px, 2))
+        if words := measurements.unknown_words():
             _draw_banner(painter, canvas, words)
-        if isinstance(scene.ground, GroundMap):
-            ground, (height, width) = scene.ground, canvas.shape[:2]
+        if isinstance(measurements.ground, GroundMap):
+            ground, (height, width) = measurements.ground, canvas.shape[:2]
             zones = ZoneDrawing(
-                scene,
+                measurements,
                 lambda rings_m: [to_canvas(one) for one in outlines_in_sight_px(ground, rings_m)],
                 (width, height),
             )
             zones.draw(painter)
-            _draw_anchors(painter, to_canvas, scene.ground)
+            _draw_anchors(painter, to_canvas, measurements.ground)
             if self._params.circles:
-                _draw_circles(painter, to_canvas, sketch, scene.ground)
-            _draw_fans(painter, to_canvas, sketch, scene.ground)
+                _draw_circles(painter, to_canvas, sketch, measurements.ground)
+            _draw_fans(painter, to_canvas, sketch, measurements.ground)
         _draw_boxes(painter, to_canvas, sketch)
         _draw_lines(painter, to_canvas, sketch)
         _draw_status(painter, canvas, sketch)
         if self._params.legend:
-            _draw_legend(painter, canvas, (*_LEGEND, _ZONE_LEGEND) if scene.zones else _LEGEND)
+            _draw_legend(painter, canvas, (*_LEGEND, _ZONE_LEGEND) if measurements.zones else _LEGEND)
         if self._params.labels:
             _label_lines(painter, to_canvas, sketch)
             _label_boxes(painter, to_canvas, sketch)
@@ -119,9 +119,9 @@ def _draw_anchors(painter: Painter, to_canvas: _ToCanvas, ground: GroundMap) -> 
 
 
 def _draw_circles(painter: Painter, to_canvas: _ToCanvas, sketch: Sketch, ground: GroundMap) -> None:
-    positions = sketch.scene.positions
+    positions = sketch.measurements.positions
     outlines = circle_outlines_px(ground, positions.xy_m, positions.radius_m)
-    for runs, tone, observed in zip(outlines, sketch.tones, sketch.scene.tracks.observed, strict=True):
+    for runs, tone, observed in zip(outlines, sketch.tones, sketch.measurements.tracks.observed, strict=True):
         for run in runs:
             outline = to_canvas(run)
             if tone in ("danger", "warning"):
@@ -144,7 +144,7 @@ def _draw_fans(painter: Painter, to_canvas: _ToCanvas, sketch: Sketch, ground: G
 
 
 def _draw_boxes(painter: Painter, to_canvas: _ToCanvas, sketch: Sketch) -> None:
-    tracks = sketch.scene.tracks
+    tracks = sketch.measurements.tracks
     corners = to_canvas(tracks.xyxy_px).reshape(-1, 4)
     for xyxy, tone, observed in zip(corners.tolist(), sketch.tones, tracks.observed, strict=True):
         painter.box(xyxy, bgr(tone), dashed=not observed)
@@ -154,7 +154,7 @@ def _draw_lines(painter: Painter, to_canvas: _ToCanvas, sketch: Sketch) -> None:
     feet = to_canvas(sketch.feet_px)
     for line in reversed(sketch.lines):
         painter.cased_line(feet[[line.row_a, line.row_b]], bgr(line.tone), dashed=line.dashed)
-    for foot, tone, observed in zip(feet.tolist(), sketch.tones, sketch.scene.tracks.observed, strict=True):
+    for foot, tone, observed in zip(feet.tolist(), sketch.tones, sketch.measurements.tracks.observed, strict=True):
         painter.dot(foot, bgr(tone), hollow=not observed)
 
 
@@ -175,19 +175,19 @@ def _label_lines(painter: Painter, to_canvas: _ToCanvas, sketch: Sketch) -> None
 
 
 def _label_boxes(painter: Painter, to_canvas: _ToCanvas, sketch: Sketch) -> None:
-    scene, tones = sketch.scene, sketch.tones
-    corners = to_canvas(scene.tracks.xyxy_px).reshape(-1, 4).tolist()
-    remarks = scene.zone_words(), scene.around_words()
+    measurements, tones = sketch.measurements, sketch.tones
+    corners = to_canvas(measurements.tracks.xyxy_px).reshape(-1, 4).tolist()
+    remarks = measurements.zone_words(), measurements.around_words()
     names = [
         ", ".join([name, *(words[track] for words in remarks if track in words)])
-        for track, name in scene.names().items()
+        for track, name in measurements.names().items()
     ]
-    has_map = isinstance(scene.ground, GroundMap)
+    has_map = isinstance(measurements.ground, GroundMap)
     for i in sorted(range(len(tones)), key=lambda row: _GRAVENESS.get(tones[row], len(_GRAVENESS))):
         if not painter.shows(corners[i]):
             continue
-        unplaced = has_map and not scene.positions.valid[i]
-        text = f"{names[i]}: {scene.positions.reason[i] or 'no position'}" if unplaced else names[i]
+        unplaced = has_map and not measurements.positions.valid[i]
+        text = f"{names[i]}: {measurements.positions.reason[i] or 'no position'}" if unplaced else names[i]
         x1, y1, x2, y2 = corners[i]
         width, height = painter.label_size_px(text)
         above, below = y1 - height - 2, y2 + 2
@@ -196,19 +196,19 @@ def _label_boxes(painter: Painter, to_canvas: _ToCanvas, sketch: Sketch) -> None
 
 
 def _draw_status(painter: Painter, canvas: ImageArray, sketch: Sketch) -> None:
-    scene = sketch.scene
-    minutes, seconds = divmod(scene.time_s, 60.0)
-    text = f"{int(minutes):02d}:{seconds:06.3f}   frame {scene.frame_index}"
-    if isinstance(scene.ground, GroundMap):
-        age = f", {scene.ground.age_s:.1f} s old" if scene.ground.age_s > 0 else ""
-        text += f"   map: {scene.ground.method}{age}"
+    measurements = sketch.measurements
+    minutes, seconds = divmod(measurements.time_s, 60.0)
+    text = f"{int(minutes):02d}:{seconds:06.3f}   frame {measurements.frame_index}"
+    if isinstance(measurements.ground, GroundMap):
+        age = f", {measurements.ground.age_s:.1f} s old" if measurements.ground.age_s > 0 else ""
+        text += f"   map: {measurements.ground.method}{age}"
     margin = painter.font_px // 2
     top = canvas.shape[0] - painter.label_size_px(text)[1] - margin
     step = 1.3 * painter.label_size_px(text)[1]
-    for line in filter(None, (text, scene.watched_words(hatched=sketch.cells.size > 0), ASSISTANCE)):
+    for line in filter(None, (text, measurements.watched_words(hatched=sketch.cells.size > 0), ASSISTANCE)):
         painter.label(line, [(margin, top)])
         top -= step
-    if isinstance(scene.ground, GroundMap) and scene.zones and not scene.placed_zones:
+    if isinstance(measurements.ground, GroundMap) and measurements.zones and not measurements.placed_zones:
         unknown = f"ZONES UNKNOWN: {NOT_PLACED}"
         painter.label(unknown, [(margin, top)], accent=bgr("unknown"), bold=True)
 

@@ -11,7 +11,7 @@ from standoff.core.lengths import LengthUnit
 from standoff.core.roles import PERSON_ROLE, ROLE_OF_CLASS
 from standoff.core.types import IntArray
 from standoff.drawing.palette import Tone
-from standoff.stages.sinks.scene import Scene
+from standoff.stages.sinks.frame_measurements import FrameMeasurements
 
 _UNMEASURED_WITHIN_SHARE = 0.35  # of the picture's width: beyond, an unknown distance is no news
 _RANK: dict[Tone, int] = {"danger": 0, "warning": 1, "unknown": 2, "light": 3}
@@ -36,19 +36,21 @@ class PairLine:
     dashed: bool
 
 
-def pair_lines(scene: Scene, feet_px: FloatArray, within_m: float, unit: LengthUnit) -> list[PairLine]:
+def pair_lines(
+    measurements: FrameMeasurements, feet_px: FloatArray, within_m: float, unit: LengthUnit
+) -> list[PairLine]:
     """Choose the pairs to draw, gravest first.
 
     Every pair with an open hazard; for each person (each entity, in pairs without one) the nearest measured
     pair within `within_m`, and the nearest in the picture that cannot be measured.
 
     Args:
-        scene: What there is.
+        measurements: What there is.
         feet_px: (M, 2) where each track stands in the picture.
         within_m: Largest distance of a pair without a hazard.
         unit: What the lines say distances in.
     """
-    pairs, tracks = scene.proximities, scene.tracks
+    pairs, tracks = measurements.proximities, measurements.tracks
     if not len(pairs):
         return []
     row_of = {track_id: row for row, track_id in enumerate(tracks.track_id.tolist())}
@@ -57,10 +59,10 @@ def pair_lines(scene: Scene, feet_px: FloatArray, within_m: float, unit: LengthU
     measured = np.isfinite(pairs.distance_m)
     apart_px = np.linalg.norm(feet_px[rows[:, 0]] - feet_px[rows[:, 1]], axis=1)
     wanted = _nearest_of_each_owner(rows, tracks.class_id, pairs.distance_m, measured & (pairs.distance_m <= within_m))
-    in_sight = apart_px <= _UNMEASURED_WITHIN_SHARE * scene.size_px[0]
+    in_sight = apart_px <= _UNMEASURED_WITHIN_SHARE * measurements.size_px[0]
     wanted |= _nearest_of_each_owner(rows, tracks.class_id, apart_px, ~measured & in_sight)
-    wanted |= np.array([key in scene.hazards for key in keys])
-    lines = [_line(scene, k, keys[k], rows[k], unit) for k in np.flatnonzero(wanted).tolist()]
+    wanted |= np.array([key in measurements.hazards for key in keys])
+    lines = [_line(measurements, k, keys[k], rows[k], unit) for k in np.flatnonzero(wanted).tolist()]
     return sorted(lines, key=lambda line: _RANK[line.tone])
 
 
@@ -78,9 +80,9 @@ def _nearest_of_each_owner(rows: IntArray, class_id: IntArray, apart: FloatArray
     return nearest
 
 
-def _line(scene: Scene, k: int, key: tuple[int, int], rows: IntArray, unit: LengthUnit) -> PairLine:
-    pairs = scene.proximities
-    hazard = scene.hazards.get(key)
+def _line(measurements: FrameMeasurements, k: int, key: tuple[int, int], rows: IntArray, unit: LengthUnit) -> PairLine:
+    pairs = measurements.proximities
+    hazard = measurements.hazards.get(key)
     measured = bool(np.isfinite(pairs.distance_m[k]))
     tone: Tone = hazard.severity if hazard else ("light" if measured else "unknown")
     distance = unit.distance(pairs.distance_m[k], pairs.sigma_m[k], filtered=bool(pairs.filtered[k]))
@@ -89,5 +91,5 @@ def _line(scene: Scene, k: int, key: tuple[int, int], rows: IntArray, unit: Leng
         row_b=int(rows[1]),
         tone=tone,
         text=f"{distance}: {pairs.excuse[k]}" if pairs.excuse[k] else distance,
-        dashed=not (measured and scene.tracks.observed[rows].all()),
+        dashed=not (measured and measurements.tracks.observed[rows].all()),
     )

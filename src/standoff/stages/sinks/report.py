@@ -20,8 +20,8 @@ from standoff.core.zones import NOT_PLACED, ZONE_WORDS, Zone
 from standoff.files.json_text import plain
 from standoff.files.whole import partial_file
 from standoff.stages.sinks.collect import HazardLife, RunSummary
+from standoff.stages.sinks.frame_measurements import ASSISTANCE
 from standoff.stages.sinks.params import ReportParams, ShowParams
-from standoff.stages.sinks.scene import ASSISTANCE
 
 _MOST_ROWS = 200
 _MOMENT_MARGIN_M = 5.0

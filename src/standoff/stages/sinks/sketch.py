@@ -12,17 +12,17 @@ from standoff.core.types import GroundMap
 from standoff.core.watched_ground import CellArray
 from standoff.drawing.palette import Tone
 from standoff.stages.sinks.fans import Fan, fans_of
+from standoff.stages.sinks.frame_measurements import FrameMeasurements
 from standoff.stages.sinks.pair_lines import PairLine, pair_lines
 from standoff.stages.sinks.params import DrawParams
-from standoff.stages.sinks.scene import Scene
 
 
 @dataclass(frozen=True, slots=True)
 class Sketch:
-    """A scene with the colours and lines that it is drawn with.
+    """A frame's measurements with the colours and lines that they are drawn with.
 
     Attributes:
-        scene: What was measured.
+        measurements: What was measured.
         tones: Colour of each track.
         feet_px: (M, 2) where each track stands, in full-size picture pixels.
         lines: Pairs to draw, gravest first.
@@ -31,7 +31,7 @@ class Sketch:
         cells: Ground to hatch, as in `WatchedGround`; (0, 0): none, or the whole picture is unknown.
     """
 
-    scene: Scene
+    measurements: FrameMeasurements
     tones: list[Tone]
     feet_px: FloatArray
     lines: list[PairLine]
@@ -40,11 +40,11 @@ class Sketch:
     cells: CellArray
 
     @classmethod
-    def of(cls, scene: Scene, params: DrawParams, unit: LengthUnit = METRES) -> Sketch:
+    def of(cls, measurements: FrameMeasurements, params: DrawParams, unit: LengthUnit = METRES) -> Sketch:
         """Decide what to draw."""
-        feet_px = scene.feet_px()
-        fans = fans_of(scene.positions) if params.fans else []
-        lines = pair_lines(scene, feet_px, params.line_within_m, unit)
-        hatched = params.unwatched and isinstance(scene.ground, GroundMap)
-        cells = scene.watched.cells if hatched else np.zeros((0, 0), dtype=np.int8)
-        return cls(scene, scene.track_tones(), feet_px, lines, fans, unit, cells)
+        feet_px = measurements.feet_px()
+        fans = fans_of(measurements.positions) if params.fans else []
+        lines = pair_lines(measurements, feet_px, params.line_within_m, unit)
+        hatched = params.unwatched and isinstance(measurements.ground, GroundMap)
+        cells = measurements.watched.cells if hatched else np.zeros((0, 0), dtype=np.int8)
+        return cls(measurements, measurements.track_tones(), feet_px, lines, fans, unit, cells)

@@ -13,9 +13,9 @@ from standoff.drawing.encoder import VideoFile
 from standoff.drawing.text import TextSprites
 from standoff.stages.sinks.birdseye import BirdsEye
 from standoff.stages.sinks.blurring import PeopleWatch, blur
+from standoff.stages.sinks.frame_measurements import FrameMeasurements
 from standoff.stages.sinks.overlay import Overlay
 from standoff.stages.sinks.params import ShowParams, VideoParams
-from standoff.stages.sinks.scene import Scene
 from standoff.stages.sinks.sketch import Sketch
 
 
@@ -46,21 +46,21 @@ class Composer:
         """(width, height) of the composed picture; even numbers."""
         return self._canvas.shape[1], self._canvas.shape[0]
 
-    def compose(self, picture: ImageArray, scene: Scene) -> ImageArray:
+    def compose(self, picture: ImageArray, measurements: FrameMeasurements) -> ImageArray:
         """Draw one frame.
 
         Args:
             picture: (H, W, 3) uint8 BGR at `picture_size_px`.
-            scene: What was measured.
+            measurements: What was measured.
 
         Returns:
             (height, width, 3) uint8 BGR; the same array each time.
         """
         width = self._picture_size_px[0]
-        sketch = Sketch.of(scene, self._draw, self._unit)
+        sketch = Sketch.of(measurements, self._draw, self._unit)
         shown = self._canvas[:, :width]
         shown[:] = picture
-        blur(shown, scene.hidden_px, np.array([0.0, 0.0, *scene.size_px]))
+        blur(shown, measurements.hidden_px, np.array([0.0, 0.0, *measurements.size_px]))
         if self._birdseye is not None:
             self._birdseye.draw(self._canvas[:, width:], shown, sketch)
         self._overlay.draw(shown, sketch)
@@ -105,8 +105,8 @@ class VideoSink:
             self._start_s = frame.time_s
         size_px = self._composer.picture_size_px
         picture = frame.image if size_px == frame.size_px else frame.picture.resized_bgr(*size_px)
-        scene = Scene.of(result, self._zones, self._people.update(result))
-        composed = self._composer.compose(picture, scene)
+        measurements = FrameMeasurements.of(result, self._zones, self._people.update(result))
+        composed = self._composer.compose(picture, measurements)
         self._file.write(composed, frame.time_s - self._start_s)
 
     def close(self, outcome: Outcome) -> None:

@@ -11,7 +11,7 @@ from standoff.core.zones import ring_area, ring_middle
 from standoff.drawing.ground_shapes import clip_to_box
 from standoff.drawing.painter import Painter
 from standoff.drawing.palette import Tone, bgr
-from standoff.stages.sinks.scene import Scene
+from standoff.stages.sinks.frame_measurements import FrameMeasurements
 
 _TINT = 0.14
 
@@ -26,22 +26,26 @@ class ZoneDrawing:
     """The zones of one frame as they appear in one picture.
 
     Args:
-        scene: What there is.
+        measurements: What there is.
         project: From rings on the ground to rings in the picture, empty where out of sight.
         size_px: (width, height) of the picture.
     """
 
     def __init__(
         self,
-        scene: Scene,
+        measurements: FrameMeasurements,
         project: Callable[[Sequence[FloatArray]], Sequence[FloatArray]],
         size_px: tuple[int, int],
     ) -> None:
         self._high = np.array(size_px, dtype=np.float64) - 1.0
-        zones = scene.placed_zones
+        zones = measurements.placed_zones
         projected = iter(project([ring for zone in zones for ring in zone.rings_m]) if zones else ())
         self._zones: list[tuple[str, Tone, list[list[FloatArray]]]] = [
-            (zone.title, scene.zone_tone(zone), [[next(projected) for _ in polygon] for polygon in zone.polygons_m])
+            (
+                zone.title,
+                measurements.zone_tone(zone),
+                [[next(projected) for _ in polygon] for polygon in zone.polygons_m],
+            )
             for zone in zones
         ]
 

@@ -26,7 +26,7 @@ NaN and 0 while none was seen."""
 
 _SMALLEST_PX = 1.0
 _LEAST_VARIANCE = 1e-8
-"""Of a point in sides of its box: a thousandth of a pixel of a worker would be surer than anything is."""
+"""Least variance of a point, in sides of its box: a thousandth of a worker's pixel would be surer than anything is."""
 
 
 def start(rows: MotionArray) -> None:

@@ -9,14 +9,16 @@ from standoff.core.protocols import Detector
 from standoff.core.types import Detections, Frame
 from standoff.training.frame_selection.appearance import describe, sharpness
 from standoff.training.frame_selection.doubt import doubt, flickering
-from standoff.training.frame_selection.selection import Candidate
+from standoff.training.frame_selection.selection import CandidateFrame
 
 _CONSECUTIVE_S = 0.2
 """Frames further apart show other things, not the same things found and lost."""
 _ROUNDING_S = 1e-6
 
 
-def look_through(frames: Iterable[Frame], detector: Detector, every_s: float, threshold: float) -> Iterator[Candidate]:
+def look_through(
+    frames: Iterable[Frame], detector: Detector, every_s: float, threshold: float
+) -> Iterator[CandidateFrame]:
     """Yield a candidate each `every_s` seconds; the frame right after it tells which of its boxes flicker.
 
     Args:
@@ -36,7 +38,7 @@ def look_through(frames: Iterable[Frame], detector: Detector, every_s: float, th
         if following is not None and following.time_s - frame.time_s <= _CONSECUTIVE_S:
             seen = {following.index: detector.detect(following)}
             flicker = int(flickering(now, seen[following.index], threshold).sum())
-        yield Candidate(
+        yield CandidateFrame(
             index=frame.index,
             time_s=frame.time_s,
             detections=now,

@@ -32,7 +32,7 @@ class SelectionParams:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Candidate:
+class CandidateFrame:
     """One frame that was looked at.
 
     Attributes:
@@ -63,11 +63,11 @@ class Choice:
         reason: Why, in a few words.
     """
 
-    candidate: Candidate
+    candidate: CandidateFrame
     reason: str
 
 
-def choose(candidates: Sequence[Candidate], params: SelectionParams) -> list[Choice]:
+def choose(candidates: Sequence[CandidateFrame], params: SelectionParams) -> list[Choice]:
     """Choose frames, in the order of time.
 
     Greedy k-centre with weights: the most doubtful frame first, then again and again the one with the largest
@@ -127,7 +127,7 @@ def _ranks(values: FloatArray) -> FloatArray:
     return np.asarray(level / max(1, len(levels) - 1), dtype=np.float64)
 
 
-def _reason(candidate: Candidate, threshold: float, doubtful_from: float) -> str:
+def _reason(candidate: CandidateFrame, threshold: float, doubtful_from: float) -> str:
     flicker = f"{candidate.flicker} that flicker{'s' * (candidate.flicker == 1)}"
     score = candidate.detections.score
     near = int(((score >= 0.5 * threshold) & (score < 0.5 * (1 + threshold))).sum())

@@ -13,18 +13,18 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, Final
 
+from standoff.core.class_map import IGNORE
 from standoff.core.classes import CLASS_BY_NAME, CLASSES
 from standoff.core.errors import DataError
 from standoff.files.whole import make_folder
 from standoff.files.yaml_text import write_yaml
 from standoff.labels import LabelledData, LabelledPicture, load_picture, read_data
-from standoff.labels.mixture import IGNORE
 from standoff.labels.regions import OWN_REGIONS
 from standoff.labels.site_classes import site_names
 from standoff.stages.detect import DetectParams, OnnxDetector, find_model
 from standoff.stages.frames import frame_from_array
-from standoff.training.run.folder import PREPARED_DATA, refuse_used
 from standoff.training.run.plan import RunPlan
+from standoff.training.run.training_folder import PREPARED_DATA, refuse_used
 
 _REPLAY_SHARE: Final = 0.3
 """Of the pictures that training draws."""

@@ -25,7 +25,7 @@ _ABOUT_WHOLE: Final = (0.9, 1.1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class View:
+class PictureView:
     """An affine view of a picture.
 
     Attributes:
@@ -108,7 +108,7 @@ def cut_boxes(
 
 def draw_view(
     rng: np.random.Generator, picture: LabelledPicture, size_px: tuple[int, int], params: AugmentParams
-) -> View:
+) -> PictureView:
     """Draw a view of a picture: aimed at one of its objects, at a drawn size, turned, mirrored, stretched."""
     size = np.array(size_px, dtype=np.float64)
     source_size = np.array(picture.size_px, dtype=np.float64)
@@ -129,7 +129,7 @@ def draw_view(
     reach = np.abs(np.linalg.inv(linear)) @ size / 2.0
     bounds = np.sort(np.stack([reach, source_size - reach]), axis=0)
     centre = np.clip(centre, bounds[0], bounds[1])
-    return View(np.column_stack([linear, size / 2.0 - linear @ centre]), picture.size_px, size_px)
+    return PictureView(np.column_stack([linear, size / 2.0 - linear @ centre]), picture.size_px, size_px)
 
 
 def log_uniform(rng: np.random.Generator, limits: tuple[float, float]) -> float:

@@ -14,8 +14,8 @@ from standoff.core.classes import CLASSES
 from standoff.core.errors import DataError
 from standoff.core.types import Detections, Frame
 from standoff.evaluation.detection import DetectionScore, score_detections
+from standoff.evaluation.detection.detector_trial import LEAST_SCORE
 from standoff.evaluation.detection.points import score_points
-from standoff.evaluation.detection.trial import LEAST_SCORE
 from standoff.labels import LabelledPicture, load_picture
 from standoff.stages.detect import DetectParams, OnnxDetector
 from standoff.stages.frames import frame_from_array

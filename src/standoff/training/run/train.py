@@ -21,10 +21,10 @@ from standoff.training.run.before_after import BeforeAfter, before_after_lines, 
 from standoff.training.run.card import card_text
 from standoff.training.run.data_checks import open_data, report_near_duplicates
 from standoff.training.run.distributed import Crew
-from standoff.training.run.folder import RunFolder, read_run, refuse_used
 from standoff.training.run.loop import Progress, Trainer, Watcher
 from standoff.training.run.memory import keep_freed_memory
 from standoff.training.run.plan import RunPlan, flat_settings
+from standoff.training.run.training_folder import TrainingFolder, read_run, refuse_used
 from standoff.training.start.starting_point import backbone_of, compose_cfg, fill_network
 from standoff.training.start.transfer import Transferred
 
@@ -92,7 +92,7 @@ def train_on(data: LabelledData, plan: RunPlan, out: Path, listener: Listener, *
     """
     keep_freed_memory()
     leads = Crew.join().leads
-    folder = RunFolder(out, data.classes)
+    folder = TrainingFolder(out, data.classes)
     start = _resumed(folder, plan) if resumes else _started(plan, data, folder, listener, leads=leads)
     backbone_layers = plan.params.backbone_layers or start.backbone_layers
     mark = FolderInUse(out) if leads else None
@@ -171,7 +171,7 @@ class _Unreadable:
 
 
 def _write_results(
-    plan: RunPlan, data: LabelledData, folder: RunFolder, progress: Progress, listener: Listener
+    plan: RunPlan, data: LabelledData, folder: TrainingFolder, progress: Progress, listener: Listener
 ) -> None:
     folder.write_model(plan.params.export_size_px)
     compared = _compare(plan, data, folder)
@@ -187,7 +187,7 @@ def _write_results(
         listener.on_message(f"no model-half.onnx: {refusal}")
 
 
-def _compare(plan: RunPlan, data: LabelledData, folder: RunFolder) -> list[BeforeAfter]:
+def _compare(plan: RunPlan, data: LabelledData, folder: TrainingFolder) -> list[BeforeAfter]:
     """Compare with where the run began, unless that was nothing."""
     if plan.weights is None:
         return []
@@ -203,7 +203,7 @@ def _compare(plan: RunPlan, data: LabelledData, folder: RunFolder) -> list[Befor
     )
 
 
-def _started(plan: RunPlan, data: LabelledData, folder: RunFolder, listener: Listener, *, leads: bool) -> _Start:
+def _started(plan: RunPlan, data: LabelledData, folder: TrainingFolder, listener: Listener, *, leads: bool) -> _Start:
     cfg_text, network, transferred = compose_start(plan, data)
     facts = {
         "data": asdict(summarise(data)),
@@ -221,7 +221,7 @@ def _started(plan: RunPlan, data: LabelledData, folder: RunFolder, listener: Lis
     return _Start(network, backbone_of(network, transferred), transferred.folded)
 
 
-def _resumed(folder: RunFolder, plan: RunPlan) -> _Start:
+def _resumed(folder: TrainingFolder, plan: RunPlan) -> _Start:
     cfg = read_cfg(folder.cfg)
     facts = folder.read_start()
     classes = folder.read_classes()

@@ -81,7 +81,7 @@ class Cell:
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class ScenarioTable:
     """Scenarios side by side.
 
     Attributes:
@@ -92,11 +92,11 @@ class Table:
     columns: tuple[str, ...]
     rows: tuple[tuple[Cell, ...], ...]
 
-    def only(self, columns: Sequence[str]) -> Table:
+    def only(self, columns: Sequence[str]) -> ScenarioTable:
         """Return the table with these columns, as far as it has them."""
         kept = [index for index, column in enumerate(self.columns) if column in columns]
         rows = tuple(tuple(row[index] for index in kept) for row in self.rows)
-        return Table(tuple(self.columns[index] for index in kept), rows)
+        return ScenarioTable(tuple(self.columns[index] for index in kept), rows)
 
     def to_markdown(self) -> str:
         """Return it as Markdown, the best figures bold."""
@@ -105,7 +105,7 @@ class Table:
         return heading + "|---" * len(self.columns) + "|\n" + "".join(rows)
 
 
-def table_of(results: Sequence[Result]) -> Table:
+def table_of(results: Sequence[Result]) -> ScenarioTable:
     """Return in what scenarios differ, and their accuracy at their best step as the paper's Table 2 has it, per cent.
 
     The outcome is a column only where a scenario did not finish.
@@ -132,7 +132,7 @@ def table_of(results: Sequence[Result]) -> Table:
         rows.append((*cells, *([Cell(result.outcome)] if tells else [])))
     differs, outcome = WORDS
     columns = ("scenario", differs, "best step", *names, "minutes", *([outcome] if tells else []))
-    return Table(columns, tuple(rows))
+    return ScenarioTable(columns, tuple(rows))
 
 
 def _number(result: Result, name: str) -> float:

@@ -18,12 +18,12 @@ from standoff.labels import LabelledData
 from standoff.training.run.checkpoint import has_checkpoint
 from standoff.training.run.data_checks import open_data, report_near_duplicates
 from standoff.training.run.distributed import Crew
-from standoff.training.run.folder import CHECKPOINTS, refuse_used
 from standoff.training.run.memory import is_out_of_memory
 from standoff.training.run.train import Listener, compose_start, train_on
-from standoff.training.sweep.folder import SweepFolder
+from standoff.training.run.training_folder import CHECKPOINTS, refuse_used
 from standoff.training.sweep.results import Result, State
 from standoff.training.sweep.scenarios import Sweep
+from standoff.training.sweep.sweep_folder import SweepFolder
 
 _log = logging.getLogger(__name__)
 
