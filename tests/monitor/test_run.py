@@ -59,9 +59,8 @@ class Film(DrawnFilm):
         black = np.zeros((100, 120, 3), np.uint8)
         super().__init__([black] * count, fails_after=broken_after, error=broken)
 
-    @property
-    def description(self) -> Mapping[str, Any]:
-        return {**super().description, "warnings": ["dark"]}
+    def describe(self) -> Mapping[str, Any]:
+        return {**super().describe(), "warnings": ["dark"]}
 
 
 def monitor(*, detect_every: int = 1, mapped: bool = True) -> Monitor:

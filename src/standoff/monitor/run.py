@@ -146,15 +146,15 @@ class Run:
 def describe_run(source: Source, monitor: Monitor) -> dict[str, Any]:
     """Return what is known of a run, for its record and its report: before the first frame, or after the last."""
     return {
-        "source": source.description,
-        "model": monitor.detector.description,
-        "ground": monitor.ground.description,
-        "watched": monitor.watcher.description,
-        "alarms": monitor.hazard.description.get("alarms"),
+        "source": source.describe(),
+        "model": monitor.detector.describe(),
+        "ground": monitor.ground.describe(),
+        "watched": monitor.watcher.describe(),
+        "alarms": monitor.hazard.describe().get("alarms"),
         "warnings": warnings_of(source, *monitor.stages.values()),
     }
 
 
 def warnings_of(*parts: Described) -> list[str]:
     """Return what is odd about some parts and about what they saw so far, a clause each."""
-    return [text for part in parts for text in part.description.get("warnings", ())]
+    return [text for part in parts for text in part.describe().get("warnings", ())]

@@ -51,8 +51,8 @@ def test_a_part_keeps_its_indices(
         frames = list(source)
     assert [frame.index for frame in frames] == [index_in(frame.image) for frame in frames] == expected
     assert source.frame_count == len(expected)
-    assert source.description["kind"] == "image folder"
-    assert source.description["every"] == every
+    assert source.describe()["kind"] == "image folder"
+    assert source.describe()["every"] == every
 
 
 def test_what_file_managers_leave_behind_is_overlooked(tmp_path: Path) -> None:

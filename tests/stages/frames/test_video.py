@@ -126,7 +126,7 @@ def test_rotation_metadata_turn_the_pictures_as_opencv_does(tmp_path: Path, rota
         assert frame.size_px == (expected.shape[1], expected.shape[0])
     with open_source(path) as source:
         assert source.size_px == ((130, 82) if abs(rotation_deg) == 180 else (82, 130))
-        assert abs(source.description["rotation_deg"]) == abs(rotation_deg)
+        assert abs(source.describe()["rotation_deg"]) == abs(rotation_deg)
 
 
 def test_frames_tell_when_they_were_captured_if_the_file_does(tmp_path: Path) -> None:
@@ -165,7 +165,7 @@ def test_the_surveyed_public_video_reads_as_opencv_reads_it(shared_data: Path) -
                 assert np.array_equal(frame.image, expected)
             assert frame.time_s == pytest.approx(frame.index / 10)
         assert frames == list(range(795))
-        assert source.description["corrupt_frames"] == 0
+        assert source.describe()["corrupt_frames"] == 0
     assert [frame.index for frame in read(path, start_s=38.8, stop_s=39.3, every=2)] == [388, 390, 392]
 
 
@@ -261,7 +261,7 @@ def test_a_hole_in_the_middle_is_bridged_and_counted(tmp_path: Path) -> None:
     path.write_bytes(content)
     with open_source(path) as source:
         frames = list(source)
-        assert source.description["corrupt_frames"] > 0
+        assert source.describe()["corrupt_frames"] > 0
     assert 30 < len(frames) <= 60
     assert frames[-1].time_s == pytest.approx(5.9)
 

@@ -116,17 +116,16 @@ class FileSource(protocols.Source):
         """What does not fit together, was not used or was lost, a clause each; some are known only at the end."""
         return (*self._reader.warnings, *self._telemetry.warnings)
 
-    @property
-    def description(self) -> dict[str, Any]:
-        """What it is and which part was wanted, for the record; counts grow while it is read."""
+    def describe(self) -> dict[str, Any]:
+        """Return what it is and which part was wanted, for the record; counts grow while it is read."""
         prior = self.camera_prior
         return {
-            **self._reader.description,
+            **self._reader.describe(),
             **self._selection._asdict(),
             "warnings": list(self.warnings),
             "frames_expected": self.frame_count,
             "utc": {"first": self._reader.started_at, "told_by": None if self._reader.started_at is None else "file"},
-            "telemetry": self._telemetry.description,
+            "telemetry": self._telemetry.describe(),
             "camera": {
                 "origin": prior.origin,
                 "focal_px": round(float(prior.camera.matrix[0, 0]), 1),
