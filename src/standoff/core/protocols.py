@@ -47,7 +47,7 @@ class Described(Protocol):
 
 @runtime_checkable
 class Source(Described, Protocol):
-    """Where frames come from."""
+    """Where frames come from; nothing is opened before the first question, which raises what is wrong with it."""
 
     @property
     def size_px(self) -> tuple[int, int]:

@@ -6,11 +6,11 @@ import logging
 from collections import defaultdict
 from collections.abc import Generator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import replace
 from typing import Any
 
-from standoff.core.errors import OutputError
+from standoff.core.errors import OutputError, StandoffError
 from standoff.core.protocols import Described, Sink, Source
 from standoff.core.stage_durations import Durations
 from standoff.core.types import FrameResult, Outcome
@@ -128,9 +128,10 @@ class Run:
         return replace(result, stage_ms=stage_ms)
 
     def _end(self, outcome: Outcome) -> None:
-        # What the source lost, and what the stages saw, is known only now.
-        known = {} if self.folder is None else self.folder.record.about
-        about = {**known, **describe_run(self.source, self.monitor)}
+        about = {} if self.folder is None else self.folder.record.about
+        # What the source lost, and what the stages saw, is known only now; one that cannot be opened says nothing.
+        with suppress(StandoffError):
+            about = {**about, **describe_run(self.source, self.monitor)}
         ended = replace(outcome, about=about, counts=self.monitor.counts)
         self._fan_out.close(ended)
         self.source.close()

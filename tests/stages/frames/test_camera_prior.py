@@ -122,7 +122,7 @@ def test_a_log_that_is_asked_for_and_cannot_be_used_is_an_error(tmp_path: Path, 
     if content is not None:
         log.write_text(content, encoding="utf-8")
     with pytest.raises(SourceError, match=r"asked\.srt is not used"):
-        open_source(film, telemetry=log)
+        open_source(film, telemetry=log).describe()
 
 
 def test_a_broken_log_beside_a_film_is_one_warning(tmp_path: Path) -> None:

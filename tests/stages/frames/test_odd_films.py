@@ -77,7 +77,7 @@ def test_pixels_that_are_not_square_are_stretched_and_named(
 def test_pixels_of_no_format_are_refused(tmp_path: Path) -> None:
     path = write_video(tmp_path / "slit.mp4", 3, Recipe(pixel_aspect=Fraction(1, 90)))
     with pytest.raises(SourceError, match=r"pixels 1:90 wide in slit\.mp4"):
-        open_source(path)
+        open_source(path).describe()
 
 
 def write_two_films(path: Path, sizes: Sequence[tuple[int, int]], default: Collection[int]) -> Path:
