@@ -17,6 +17,7 @@ PUBLIC_NAMES = {
     "standoff.clips": {
         "ANNOTATIONS_FILE", "CAMERA_FILE", "CLIP_FILES", "CLIP_FORMAT", "CLIP_FRAMES_FILE", "CLIP_FRAMES_SCHEMA",
         "COLUMNS", "Clip", "Column", "Columns", "DETECTIONS_FILE", "DEVICES_FILE", "DEVICES_SCHEMA", "FOOT_COLUMNS",
+        "FRAME_COLUMNS",
         "NOISY_DETECTIONS_FILE", "NOISY_DETECTIONS_SCHEMA", "PAIRS_FILE", "PAIRS_SCHEMA", "REFERENCE_FILE",
         "RENDER_AGAIN", "RecordedDetections", "RunFolder", "RunTable", "SCENE_FILE", "TELEMETRY_FILE", "TRUTH_FILE",
         "TRUTH_FILES", "TRUTH_NUMBERS", "TRUTH_SCHEMA", "TrueBoard", "TrueReference", "VIDEO_FILE", "chosen_rows",

@@ -122,6 +122,17 @@ def test_a_run_replayed_from_its_own_detections_is_the_same_run(
     assert len(contents(replay)["hazards"]) > 1
 
 
+def test_a_recording_that_does_not_say_who_told_the_time_is_replayed_all_the_same(
+    film: Path, recording: Path, tmp_path: Path
+) -> None:
+    original = monitor(film, recording, tmp_path / "original")
+    table = pq.read_table(original / "detections.parquet").drop_columns(["captured_at", "told_by"])
+    pq.write_table(table, tmp_path / "earlier.parquet")
+    forbidden = with_detector(recording, "Forbidden")
+    replay = monitor(film, forbidden, tmp_path / "replay", detections=str(tmp_path / "earlier.parquet"))
+    assert_same(replay, original)
+
+
 def test_every_frame_is_in_the_table_and_says_whether_the_detector_ran(
     film: Path, recording: Path, tmp_path: Path
 ) -> None:

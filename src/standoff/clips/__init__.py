@@ -31,7 +31,7 @@ from standoff.clips.clip_folder import (
     VIDEO_FILE,
     read_clip_table,
 )
-from standoff.clips.columns import Column, Columns, chosen_rows, columns_of, read_columns, schema_of
+from standoff.clips.columns import FRAME_COLUMNS, Column, Columns, chosen_rows, columns_of, read_columns, schema_of
 from standoff.clips.detections import (
     COLUMNS,
     DETECTIONS_FILE,
@@ -55,6 +55,7 @@ __all__ = [
     "DEVICES_FILE",
     "DEVICES_SCHEMA",
     "FOOT_COLUMNS",
+    "FRAME_COLUMNS",
     "NOISY_DETECTIONS_FILE",
     "NOISY_DETECTIONS_SCHEMA",
     "PAIRS_FILE",

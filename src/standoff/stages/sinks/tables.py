@@ -15,7 +15,7 @@ import numpy as np
 import pyarrow as pa
 
 from standoff import __version__
-from standoff.clips import COLUMNS, FOOT_COLUMNS, Column, metadata_of, schema_of
+from standoff.clips import COLUMNS, FOOT_COLUMNS, FRAME_COLUMNS, Column, metadata_of, schema_of
 from standoff.core.classes import CLASSES
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import FrameResult, GroundMap, IntArray, NoGroundMap, Outcome, TextArray, WatchedGround
@@ -27,15 +27,8 @@ from standoff.stages.sinks.parquet_parts import Columns, ParquetParts
 _CLASS = pa.dictionary(pa.int32(), pa.string())
 _NAMES: TextArray = np.array([site_class.name for site_class in CLASSES], dtype=object)
 
-_FRAME_COLUMNS = (
-    ("stream_id", pa.string(), "", "name of the stream"),
-    ("frame", pa.int64(), "", "index in the source, from 0, skipped frames counted"),
-    ("time_s", pa.float64(), "s", "presentation timestamp from the start of the source"),
-    ("captured_at", pa.timestamp("us", tz="UTC"), "", "when the picture was taken; null: nobody tells"),
-    ("told_by", pa.string(), "", "who tells when it was taken: file, arrival, rtcp, telemetry; null: nobody"),
-)
 _TRACK_COLUMNS = (
-    *_FRAME_COLUMNS,
+    *FRAME_COLUMNS,
     ("track_id", pa.int64(), "", "unique in the stream, never used again"),
     ("class", _CLASS, "", "what it is"),
     ("score", pa.float64(), "", "confidence of the last detection, 0 to 1"),
@@ -62,7 +55,7 @@ _TRACK_COLUMNS = (
 )
 _ZONES_COLUMN = ("zones", pa.list_(pa.string()), "", "names of the zones that an open hazard of this track is about")
 _PROXIMITY_COLUMNS = (
-    *_FRAME_COLUMNS,
+    *FRAME_COLUMNS,
     ("track_a", pa.int64(), "", "the smaller track id"),
     ("track_b", pa.int64(), "", "the larger track id"),
     ("class_a", _CLASS, "", "class of track_a"),
@@ -82,7 +75,7 @@ _PROXIMITY_COLUMNS = (
     ("excuse", pa.string(), "", "why it is no hazard however near; empty where it may be one"),
 )
 _FRAMES_COLUMNS = (
-    *_FRAME_COLUMNS,
+    *FRAME_COLUMNS,
     ("detected", pa.bool_(), "", "false: the detector rested in this frame"),
     ("detections", pa.int64(), "", "number of detections; null where the detector rested"),
     ("tracks", pa.int64(), "", "number of live tracks"),
