@@ -41,6 +41,7 @@ from standoff.clips.detections import (
     metadata_of,
     read_detections,
 )
+from standoff.clips.ground_maps import MAP_COLUMNS, map_of, map_values
 from standoff.clips.run_folder import RunFolder, RunTable
 
 __all__ = [
@@ -56,6 +57,7 @@ __all__ = [
     "DEVICES_SCHEMA",
     "FOOT_COLUMNS",
     "FRAME_COLUMNS",
+    "MAP_COLUMNS",
     "NOISY_DETECTIONS_FILE",
     "NOISY_DETECTIONS_SCHEMA",
     "PAIRS_FILE",
@@ -81,6 +83,8 @@ __all__ = [
     "columns_of",
     "is_recording",
     "load_clip",
+    "map_of",
+    "map_values",
     "metadata_of",
     "read_clip_table",
     "read_columns",

@@ -15,10 +15,19 @@ import numpy as np
 import pyarrow as pa
 
 from standoff import __version__
-from standoff.clips import COLUMNS, FOOT_COLUMNS, FRAME_COLUMNS, Column, metadata_of, schema_of
+from standoff.clips import (
+    COLUMNS,
+    FOOT_COLUMNS,
+    FRAME_COLUMNS,
+    MAP_COLUMNS,
+    Column,
+    map_values,
+    metadata_of,
+    schema_of,
+)
 from standoff.core.classes import CLASSES
 from standoff.core.homography import BoolArray, FloatArray
-from standoff.core.types import FrameResult, GroundMap, IntArray, NoGroundMap, Outcome, TextArray, WatchedGround
+from standoff.core.types import FrameResult, IntArray, Outcome, TextArray, WatchedGround
 from standoff.core.watched_shares import around_tracks
 from standoff.files.json_text import plain
 from standoff.stages.sinks.params import TableParams
@@ -79,12 +88,7 @@ _FRAMES_COLUMNS = (
     ("detected", pa.bool_(), "", "false: the detector rested in this frame"),
     ("detections", pa.int64(), "", "number of detections; null where the detector rested"),
     ("tracks", pa.int64(), "", "number of live tracks"),
-    ("map", pa.bool_(), "", "whether there is a ground map; false: nothing was measured in this frame"),
-    ("map_method", pa.string(), "", "how the map was found; null without a map"),
-    ("map_reason", pa.string(), "", "why there is no map; null with a map"),
-    ("map_age_s", pa.float64(), "s", "since the map was last observed; null without a map"),
-    ("scale_m_per_px", pa.float64(), "m/px", "Eq. 6's scale; null without a map"),
-    ("image_to_ground", pa.list_(pa.float64()), "", "3 x 3, undistorted pixels to metres, row by row; null without"),
+    *MAP_COLUMNS,
     ("watched_share", pa.float64(), "", "part of the picture's ground where a worker would be found; null: not judged"),
     ("unwatched_reason", pa.string(), "", "why most of the rest is not watched; null where all of it is"),
     ("missed_share", pa.float64(), "", "of workers on watched ground, share missed in one picture; null: unknown"),
@@ -217,20 +221,6 @@ def _seen(track_id: IntArray, result: FrameResult) -> BoolArray:
     return np.isin(track_id, result.tracks.track_id[result.tracks.observed])
 
 
-def _map_values(ground: GroundMap | NoGroundMap) -> dict[str, Any]:
-    if isinstance(ground, NoGroundMap):
-        absent = ("map_method", "map_age_s", "scale_m_per_px", "image_to_ground")
-        return {"map": False, "map_reason": ground.reason, **dict.fromkeys(absent)}
-    return {
-        "map": True,
-        "map_reason": None,
-        "map_method": ground.method,
-        "map_age_s": ground.age_s,
-        "scale_m_per_px": ground.scale_m_per_px,
-        "image_to_ground": ground.image_to_ground.ravel().tolist(),
-    }
-
-
 def _watched_values(watched: WatchedGround) -> dict[str, Any]:
     return {
         "watched_share": watched.share,
@@ -245,7 +235,7 @@ def _frame_rows(result: FrameResult) -> Columns:
         "detected": result.detected,
         "detections": len(result.detections) if result.detected else None,
         "tracks": len(result.tracks),
-        **_map_values(result.ground),
+        **map_values(result.ground),
         **_watched_values(result.watched),
     }
     return {**_frame_columns(result, 1), **{name: [value] for name, value in values.items()}}
