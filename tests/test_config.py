@@ -1,7 +1,9 @@
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import pytest
 import yaml
@@ -150,7 +152,7 @@ class Unfinished:
 
 def test_a_replacement_that_lacks_a_method_is_one_line_that_names_it() -> None:
     settings = load_settings(overrides={"replace": {"detect": {"factory": "test_config:Unfinished"}}})
-    with pytest.raises(ConfigError, match=r"a Detector, found Unfinished without description, prepare, reset, rests"):
+    with pytest.raises(ConfigError, match=r"a Detector, found Unfinished without describe, prepare, reset, rests"):
         build_monitor(settings)
 
 
@@ -198,7 +200,7 @@ def test_more_references_and_markers_stand_beside_the_first_reference() -> None:
     }
     ground = build_ground(load_settings(overrides={"ground": several}))
     assert isinstance(ground, ScaleWatch)
-    described = ground.description
+    described = ground.describe()
     assert [one["place_known"] for one in described["references"]] == [True, False, True]
     assert described["markers"] == [0]
 
@@ -243,7 +245,8 @@ def test_the_settings_among_the_examples_can_be_used(example: str) -> None:
 class PeopleOnly(Blind):
     """A model that knows people only."""
 
-    description = {"class_map": {"person": "worker"}}  # noqa: RUF012
+    def describe(self) -> Mapping[str, Any]:
+        return {"class_map": {"person": "worker"}}
 
 
 def people_only(**more: object) -> Settings:
@@ -357,4 +360,4 @@ def test_the_survey_s_own_camera_removes_the_lens_from_the_motion_too(tmp_path: 
     points = "".join(f"- {{px: [{x}, {y}], m: [{x / 50}, {-y / 40}]}}\n" for x in (100, 500) for y in (100, 400))
     (tmp_path / "survey.yaml").write_text(f"image_size_px: [640, 480]\ncamera: camera.yaml\npoints:\n{points}")
     settings = load_settings(write(tmp_path, "ground: {survey: survey.yaml}\n"))
-    assert build_stage("motion", settings).description["lens_distortion_removed"]
+    assert build_stage("motion", settings).describe()["lens_distortion_removed"]

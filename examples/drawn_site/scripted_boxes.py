@@ -22,9 +22,8 @@ class ScriptedBoxes(Detector):
         self._path = path
         self._frames = json.loads(Path(path).read_text(encoding="utf-8"))
 
-    @property
-    def description(self) -> dict[str, str]:
-        """What the record of a run says of it."""
+    def describe(self) -> dict[str, str]:
+        """Return what the record of a run says of it."""
         return {"kind": "scripted boxes", "path": self._path}
 
     def detect(self, frame: Frame) -> Detections:

@@ -17,17 +17,19 @@ PUBLIC_NAMES = {
     "standoff.clips": {
         "ANNOTATIONS_FILE", "CAMERA_FILE", "CLIP_FILES", "CLIP_FORMAT", "CLIP_FRAMES_FILE", "CLIP_FRAMES_SCHEMA",
         "COLUMNS", "Clip", "Column", "Columns", "DETECTIONS_FILE", "DEVICES_FILE", "DEVICES_SCHEMA", "FOOT_COLUMNS",
+        "FRAME_COLUMNS", "MAP_COLUMNS",
         "NOISY_DETECTIONS_FILE", "NOISY_DETECTIONS_SCHEMA", "PAIRS_FILE", "PAIRS_SCHEMA", "REFERENCE_FILE",
         "RENDER_AGAIN", "RecordedDetections", "RunFolder", "RunTable", "SCENE_FILE", "TELEMETRY_FILE", "TRUTH_FILE",
         "TRUTH_FILES", "TRUTH_NUMBERS", "TRUTH_SCHEMA", "TrueBoard", "TrueReference", "VIDEO_FILE", "chosen_rows",
-        "columns_of", "is_recording", "load_clip", "metadata_of", "read_clip_table", "read_columns",
+        "columns_of", "is_recording", "load_clip", "map_of", "map_values",
+        "metadata_of", "read_clip_table", "read_columns",
         "read_detections", "read_scene", "schema_of",
     },
     "standoff.config": {
         "GroundSettings", "MarkerSettings", "ReferenceSettings", "Replacement", "STAGE_NAMES", "Settings",
         "SiteSettings", "StreamSettings", "build_ground", "build_marker_observer", "build_replacement", "build_stage",
         "build_watcher", "build_zones", "import_factory", "load_settings", "load_site", "read_params",
-        "read_settings_file", "resolved",
+        "read_settings_file", "recorded_settings", "resolved",
     },
     "standoff.evaluation.coverage": {
         "ClipSamples", "CoverageResult", "PairRow", "PairSamples", "PositionRow", "PositionSamples",

@@ -8,7 +8,9 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import av
 import cv2
@@ -38,7 +40,8 @@ FINDS = {"finds_workers": {"height_px": [4.0, 8.0, 16.0], "share": [0.5, 0.95, 0
 class Approach(protocols.Detector):
     """A detector that sees a worker walk towards an excavator."""
 
-    description = FINDS
+    def describe(self) -> Mapping[str, Any]:
+        return FINDS
 
     def detect(self, frame: Frame) -> Detections:
         left = 20.0 + 60.0 * frame.time_s

@@ -66,7 +66,7 @@ def test_of_two_streams_the_film_is_read_and_not_its_preview(reports: Path) -> N
 def test_a_frame_that_repeats_a_time_is_left_out_and_counted(reports: Path) -> None:
     with open_source(reports / "video" / "dup.mkv") as source:
         times_s = [frame.time_s for frame in source]
-        description = source.description
+        description = source.describe()
     assert (np.diff(times_s) > 0.0).all()
     assert (len(times_s), description["skipped_frames"]) == (24, 1)
 

@@ -15,7 +15,7 @@ def test_a_detector_is_quantised_and_the_table_says_how_good_it_is(call: Call, t
     code, out, err = call("quantize", model, "--data", data, "--out", tmp_path / "int8.onnx", "--calibration", 8)
     assert code == 0, err
     assert "AP worker" in out and "median ms" in out and "minmax calibration" in out
-    assert OnnxDetector(tmp_path / "int8.onnx").description["family"] == "yolov3"
+    assert OnnxDetector(tmp_path / "int8.onnx").describe()["family"] == "yolov3"
 
 
 def test_what_loses_too_much_is_refused_in_one_line_and_reported(call: Call, tmp_path: Path) -> None:
@@ -57,4 +57,4 @@ def test_export_can_halve_the_file(call: Call, tmp_path: Path) -> None:
     assert code == 0, err
     types = {tensor.data_type for tensor in onnx.load(str(tmp_path / "half.onnx")).graph.initializer}
     assert onnx.TensorProto.FLOAT16 in types
-    assert OnnxDetector(tmp_path / "half.onnx").description["classes"] == ["worker", "vehicle"]
+    assert OnnxDetector(tmp_path / "half.onnx").describe()["classes"] == ["worker", "vehicle"]

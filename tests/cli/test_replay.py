@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +38,8 @@ SELECTIONS: dict[str, dict[str, Any]] = {
 class Unsure(protocols.Detector):
     """A detector of two people and an excavator: boxes a little off, now and then one missing or nothing at all."""
 
-    description = {"model": "unsure", "class_map": {"man": "worker", "digger": "excavator"}} | FINDS
+    def describe(self) -> Mapping[str, Any]:
+        return {"model": "unsure", "class_map": {"man": "worker", "digger": "excavator"}} | FINDS
 
     def detect(self, frame: Frame) -> Detections:
         if frame.index in NOTHING_SEEN:
@@ -120,6 +122,17 @@ def test_a_run_replayed_from_its_own_detections_is_the_same_run(
     assert len(contents(replay)["hazards"]) > 1
 
 
+def test_a_recording_that_does_not_say_who_told_the_time_is_replayed_all_the_same(
+    film: Path, recording: Path, tmp_path: Path
+) -> None:
+    original = monitor(film, recording, tmp_path / "original")
+    table = pq.read_table(original / "detections.parquet").drop_columns(["captured_at", "told_by"])
+    pq.write_table(table, tmp_path / "earlier.parquet")
+    forbidden = with_detector(recording, "Forbidden")
+    replay = monitor(film, forbidden, tmp_path / "replay", detections=str(tmp_path / "earlier.parquet"))
+    assert_same(replay, original)
+
+
 def test_every_frame_is_in_the_table_and_says_whether_the_detector_ran(
     film: Path, recording: Path, tmp_path: Path
 ) -> None:
@@ -155,8 +168,8 @@ def test_a_replay_can_be_replayed_and_knows_the_true_detector(
     assert_same(twice, original)
     model = json.loads((twice / "run.json").read_text())["model"]
     assert model["kind"] == "recorded"
-    assert model["detector"]["detector"] == Unsure.description
-    assert model["class_map"] == Unsure.description["class_map"]
+    assert model["detector"]["detector"] == Unsure().describe()
+    assert model["class_map"] == Unsure().describe()["class_map"]
 
 
 def test_frames_that_were_not_recorded_end_the_replay_in_one_line(

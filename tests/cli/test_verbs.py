@@ -37,6 +37,7 @@ def test_check_reads_the_files_that_the_settings_name(call: Call, site: Path, tm
         ("evaluate",),
         ("evaluate", "positions"),
         ("evaluate", "paper"),
+        ("evaluate", "run"),
         ("config",),
         ("bench",),
         ("simulate",),

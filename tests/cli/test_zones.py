@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -23,7 +25,8 @@ RING = [[5.0, 5.0], [8.0, 5.0], [8.0, 7.0], [5.0, 7.0], [5.0, 5.0]]
 class Walk(protocols.Detector):
     """A detector that sees a worker walk through the picture at 3 m/s, along y = 5.5 m."""
 
-    description = FINDS
+    def describe(self) -> Mapping[str, Any]:
+        return FINDS
 
     def detect(self, frame: Frame) -> Detections:
         left = 20.0 + 60.0 * frame.time_s

@@ -1,8 +1,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -32,11 +34,17 @@ Seen = Detections | None
 
 def write(folder: Path, seen: list[Seen], params: TableParams | None = None) -> Path:
     """Write a run that read every second frame."""
-    sink = TableSink(folder / "detections.parquet", detections_table(SOURCE, DETECTOR), params)
-    for number, detections in enumerate(seen):
-        sink.write(result_of(2 * number, detections))
-    sink.close(Outcome("complete"))
+    with closing_table(folder, params) as sink:
+        for number, detections in enumerate(seen):
+            sink.write(result_of(2 * number, detections))
     return folder
+
+
+@contextmanager
+def closing_table(folder: Path, params: TableParams | None = None) -> Iterator[TableSink]:
+    sink = TableSink(folder / "detections.parquet", detections_table(SOURCE, DETECTOR), params)
+    yield sink
+    sink.close(Outcome("complete"))
 
 
 def result_of(index: int, seen: Seen) -> FrameResult:
@@ -195,6 +203,28 @@ def test_ground_points_come_back_and_stay_unknown_where_they_are(tmp_path: Path,
     found = read_detections(write(tmp_path, [None, seen, some(0)])).detections
     np.testing.assert_allclose(found.foot_px, foot_px)
     np.testing.assert_allclose(found.foot_covariance_px2, covariance_px2)
+
+
+def test_every_row_says_when_the_picture_was_taken_also_where_nothing_was_seen(tmp_path: Path) -> None:
+    begun = datetime(2026, 5, 4, 9, 12, tzinfo=UTC)
+    with closing_table(tmp_path) as sink:
+        for number, seen in enumerate([some(2), some(0), None]):
+            result = result_of(number, seen)
+            taken = begun + timedelta(seconds=number / 25)
+            sink.write(replace(result, frame=replace(result.frame, captured_at=taken, told_by="telemetry")))
+        sink.write(result_of(3, some(1)))
+    rows = pq.read_table(tmp_path / "detections.parquet").to_pylist()
+    seconds = [None if row["captured_at"] is None else (row["captured_at"] - begun).total_seconds() for row in rows]
+    assert seconds == [0.0, 0.0, 0.04, 0.08, None]
+    assert [row["told_by"] for row in rows] == ["telemetry"] * 4 + [None]
+
+
+def test_tables_from_before_somebody_told_when_a_picture_was_taken_are_read(tmp_path: Path) -> None:
+    seen: list[Seen] = [some(2), None, some(1)]
+    before = read_detections(write(tmp_path, seen))
+    after = read_detections(change(tmp_path, lambda table: table.drop_columns(["captured_at", "told_by"])))
+    assert [columns_of(after, row) for row in range(3)] == [columns_of(before, row) for row in range(3)]
+    assert after.time_s.tolist() == before.time_s.tolist()
 
 
 def test_tables_from_before_ground_points_are_read(tmp_path: Path) -> None:

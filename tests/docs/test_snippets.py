@@ -24,7 +24,7 @@ from golden.make import DETECTIONS, FILM, GOLDEN
 from labelled_sets import write_mixture, write_yolo
 
 from standoff.cli.app import app
-from standoff.config import Settings, load_settings
+from standoff.config import Settings, load_settings, load_site
 from standoff.core.errors import StandoffError
 
 PROJECT = Path(__file__).resolve().parents[2]
@@ -95,6 +95,8 @@ def workshop(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     site = yaml.safe_load((FILM / "reference.yaml").read_text())
     site |= {"detections": str(DETECTIONS), "source": {"stop_s": 0.3, "every": 2}, "outputs": ["tracks", "hazards"]}
     (tmp_path / "site.yaml").write_text(yaml.safe_dump(site))
+    cameras = {"defaults": site, "streams": {name: {"address": "site.mp4"} for name in ("gate", "crane-2")}}
+    (tmp_path / "cameras.yaml").write_text(yaml.safe_dump(cameras))
     (tmp_path / "survey.yaml").write_text(yaml.safe_dump(true_survey()))
     shutil.copytree(GOLDEN, tmp_path / "out")
     clip = tmp_path / "clips" / "mobile"
@@ -138,9 +140,11 @@ def test_the_python_of_a_page_runs(page: Path, all_of_it: bool) -> None:
 def test_the_settings_of_a_page_are_valid(page: Path, tmp_path: Path) -> None:
     for snippet in snippets(page, "yaml"):
         keys = yaml.safe_load(snippet.text)
-        if isinstance(keys, dict) and keys.keys() & Settings.model_fields.keys():
-            path = tmp_path / "site.yaml"
-            path.write_text(snippet.text)
+        path = tmp_path / "site.yaml"
+        path.write_text(snippet.text)
+        if isinstance(keys, dict) and "streams" in keys:
+            load_site(path)
+        elif isinstance(keys, dict) and keys.keys() & Settings.model_fields.keys():
             load_settings(path)
 
 

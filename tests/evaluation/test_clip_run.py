@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal
@@ -16,8 +17,9 @@ from standoff.core.errors import DataError
 from standoff.core.homography import FloatArray
 from standoff.core.protocols import Detector
 from standoff.core.types import Detections, Frame
-from standoff.evaluation.clip_run import ClipScore, ClipWitness, Encounter
+from standoff.evaluation.clip_run import ClipScore, ClipWitness, Encounter, score_run
 from standoff.evaluation.paper.truth_detector import TrueBoxes
+from standoff.evaluation.run_frames import RunFrame
 from standoff.monitor import open_run
 
 WORKER, LOADER, EXCAVATOR = drawn_clip.ENTITIES
@@ -48,7 +50,7 @@ def settings_with(clip: Clip, loader_radius_m: float, excavator_radius_m: float)
     overrides = {
         "locate": {"radius_m": radius_m, "anchor": "box_centre"},
         "hazard": {"min_duration_s": 0.0, "rule": "distance"},
-        "outputs": (),
+        "outputs": ("tracks", "proximity", "frames", "detections", "hazards"),
     }
     return load_settings(clip.folder / "reference.yaml", overrides)
 
@@ -58,11 +60,9 @@ def score_of(
 ) -> ClipScore:
     monkeypatch.setattr("standoff.config.build.find_model", lambda model: model)
     monkeypatch.setattr("standoff.config.build.OnnxDetector", lambda path, params: detector)
-    run = open_run(clip.video, out, settings)
-    witness = ClipWitness(clip, settings, run.source.size_px)
-    for result in run:
-        witness.take(result)
-    return witness.score()
+    for _ in open_run(clip.video, out, settings):
+        pass
+    return score_run(out, clip)
 
 
 def true_gap_m(other: drawn_clip.Entity, radius_m: float) -> FloatArray:
@@ -148,13 +148,38 @@ def test_a_run_that_was_stopped_early_says_so(clip: Clip, tmp_path: Path, monkey
     settings = settings_with(clip, loader_radius_m=8.0, excavator_radius_m=6.5)
     monkeypatch.setattr("standoff.config.build.find_model", lambda model: model)
     monkeypatch.setattr("standoff.config.build.OnnxDetector", lambda path, params: MovedBoxes(clip))
+    results = iter(open_run(clip.video, tmp_path / "run", settings))
+    for _ in range(drawn_clip.FRAMES // 2):
+        next(results)
+    results.close()
+    with pytest.raises(DataError, match=f"all {drawn_clip.FRAMES} frames"):
+        score_run(tmp_path / "run", clip)
+
+
+def test_a_run_scores_the_same_from_its_folder_as_while_it_goes_on(
+    clip: Clip, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also while something lies on the reference, and where a machine is not seen."""
+    settings = settings_with(clip, loader_radius_m=8.0, excavator_radius_m=6.5)
+    monkeypatch.setattr("standoff.config.build.find_model", lambda model: model)
+    monkeypatch.setattr("standoff.config.build.OnnxDetector", lambda path, params: MovedBoxes(clip))
     run = open_run(clip.video, tmp_path / "run", settings)
     witness = ClipWitness(clip, settings, run.source.size_px)
-    seen_all = []
     for result in run:
-        seen_all.append(witness.has_seen_all)
-        witness.take(result)
-    assert not any(seen_all) and witness.has_seen_all
+        witness.take(RunFrame.of_result(result))
+    live, again = witness.score().to_dict(), score_run(tmp_path / "run", clip).to_dict()
+    assert live["pairs"] and live["map_only"]["level"]["points"] > 0
+    np.testing.assert_equal(again, live)
+
+
+def test_a_run_of_another_film_is_not_scored(clip: Clip, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    settings = settings_with(clip, loader_radius_m=8.0, excavator_radius_m=6.5)
+    score_of(clip, settings, MovedBoxes(clip), tmp_path / "run", monkeypatch)
+    other = Path(shutil.copytree(clip.folder, tmp_path / "other"))
+    with (other / "video.mp4").open("ab") as video:
+        video.write(b"\0\0\0\x08free")
+    with pytest.raises(DataError, match="with other content"):
+        score_run(tmp_path / "run", replace(clip, folder=other))
 
 
 def test_settings_without_a_reference_object_are_refused(clip: Clip) -> None:

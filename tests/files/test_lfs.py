@@ -19,8 +19,8 @@ from standoff.stages.ground import read_boards
 
 READERS: dict[str, tuple[str, Callable[[Path], object]]] = {
     "model": ("m.onnx", OnnxDetector),
-    "film": ("film.mp4", open_source),
-    "picture": ("0.jpg", lambda path: open_source(path.parent, fps=1.0)),
+    "film": ("film.mp4", lambda path: open_source(path).describe()),
+    "picture": ("0.jpg", lambda path: open_source(path.parent, fps=1.0).describe()),
     "board": ("0.jpg", lambda path: read_boards([path], (7, 6))),
 }
 

@@ -1,13 +1,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from standoff.core import protocols
-from standoff.core.errors import SourceTruncated
+from standoff.core.errors import SourceError, SourceTruncated
 from standoff.core.types import (
     CameraMotion,
     Detections,
@@ -17,7 +18,7 @@ from standoff.core.types import (
     NoGroundMap,
 )
 from standoff.monitor import Monitor, Run
-from standoff.stages.frames import frame_from_array
+from standoff.stages.frames import frame_from_array, open_source
 from standoff.stages.ground import Unmapped
 from standoff.stages.hazard import HazardMonitor
 from standoff.stages.locate import Locator
@@ -59,9 +60,8 @@ class Film(DrawnFilm):
         black = np.zeros((100, 120, 3), np.uint8)
         super().__init__([black] * count, fails_after=broken_after, error=broken)
 
-    @property
-    def description(self) -> Mapping[str, Any]:
-        return {**super().description, "warnings": ["dark"]}
+    def describe(self) -> Mapping[str, Any]:
+        return {**super().describe(), "warnings": ["dark"]}
 
 
 def monitor(*, detect_every: int = 1, mapped: bool = True) -> Monitor:
@@ -278,3 +278,15 @@ def test_a_run_that_is_stopped_while_it_looks_ahead_writes_what_it_began_and_end
     written = [result.frame.index for result in memory.results]
     assert written == [*range(len(written))] and last.frame.index < len(written) <= last.frame.index + 2
     assert film.shown < 10
+
+
+@pytest.mark.parametrize("overlaps", [False, True])
+def test_a_source_that_cannot_be_opened_fails_the_run_and_every_sink_hears_of_it(
+    overlaps: bool, tmp_path: Path
+) -> None:
+    memory = MemorySink()
+    run = Run(open_source(tmp_path / "away.mp4"), monitor(), {"memory": memory}, overlaps=overlaps)
+    with pytest.raises(SourceError, match="found nothing at"):
+        list(run)
+    (outcome,) = memory.outcomes
+    assert (outcome.status, memory.results) == ("failed", []) and "away.mp4" in outcome.message

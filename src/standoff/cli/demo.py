@@ -13,7 +13,6 @@ from standoff.core.errors import DataError
 
 if TYPE_CHECKING:
     from standoff.clips import Clip
-    from standoff.evaluation.clip_run import ClipWitness
 
 
 def demo(
@@ -35,21 +34,20 @@ def demo(
     from standoff.cli.console import progress, write_json
     from standoff.cli.demo_tables import print_scores
     from standoff.config import load_settings
-    from standoff.evaluation.clip_run import ClipWitness, score_papers_method
+    from standoff.evaluation.clip_run import score_papers_method, score_run
     from standoff.monitor import open_run
 
     quiet = str(json_file) == "-"
     clip = _load_film()
     # As a user would: the film's own description of its reference object and camera, and defaults for all else.
     settings = load_settings(clip.settings_file, detector_overrides(model, detections))
-    run = open_run(clip.video, out, settings, overwrite=overwrite, checked=lambda: _checked(witness))
-    witness = ClipWitness(clip, settings, run.source.size_px)
-    run_to_end(run, quiet=quiet, on_result=witness.take)
+    run = open_run(clip.video, out, settings, overwrite=overwrite, checked=lambda: _checked(out, clip))
+    run_to_end(run, quiet=quiet)
     tell(run, as_json=False, quiet=quiet)
-    if not witness.has_seen_all:
+    if run.record.counts.rows["frames"] != clip.frame_count:
         typer.echo("The film was not seen to its end: no comparison with its truth.", err=True)
         raise typer.Exit(exit_status(run))
-    score = witness.score()
+    score = score_run(out, clip)
     with progress("the paper's method", clip.frame_count, quiet=quiet) as on_frame:
         paper = score_papers_method(clip, out, on_frame)
     if json_file is not None:
@@ -60,14 +58,17 @@ def demo(
     raise typer.Exit(exit_status(run))
 
 
-def _checked(witness: ClipWitness) -> str:
-    """Return what the report says of the stated errors; nothing where the film was not seen to its end."""
+def _checked(out: Path, clip: Clip) -> str:
+    """Return what the report says of the stated errors; nothing where the run's tables are not of the whole film."""
+    from standoff.evaluation.clip_run import score_run
     from standoff.evaluation.paper.pairs import AFTER
     from standoff.evaluation.reliability import reliability_section
 
-    if not witness.has_seen_all:
+    try:
+        pairs = score_run(out, clip).pairs
+    except DataError:
         return ""
-    kinds = [(group.class_pair, group.scores[AFTER], group.coverage) for group in witness.score_pairs()]
+    kinds = [(group.class_pair, group.scores[AFTER], group.coverage) for group in pairs]
     return reliability_section(kinds, "this simulated film")
 
 

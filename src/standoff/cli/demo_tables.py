@@ -1,4 +1,4 @@
-"""What `standoff demo` prints: the run against the film's truth, and beside it the paper's method on the same boxes."""
+"""What is printed of a run against its clip's truth; by `standoff demo` beside the paper's method on the same boxes."""
 
 from __future__ import annotations
 
@@ -11,6 +11,12 @@ if TYPE_CHECKING:
     from standoff.evaluation.clip_run import ClipScore, Encounter
     from standoff.evaluation.paper.metrics import DistanceScore
     from standoff.evaluation.paper.pairs import PairGroup
+
+_MEANING = (
+    "Map: true feet within 20 m of the reference through the map, boxes left out; level: if the ground were. MADE: the "
+    "paper's mean absolute error of distances, from box to metre. Inside: share of the distances whose truth is within "
+    "1 and 1.96 stated standard errors."
+)
 
 
 def print_scores(ours: ClipScore, papers: ClipScore) -> None:
@@ -26,12 +32,15 @@ def print_scores(ours: ClipScore, papers: ClipScore) -> None:
         (label, paper, own)
         for (label, own), (_, paper) in zip(_compared(ours), _compared(papers), strict=True)
     ]  # fmt: skip
-    caption = (
-        "From the same detections. Map: true feet within 20 m of the reference through the map, boxes left out; level: "
-        "if the ground were. MADE: the paper's mean absolute error of distances, from box to metre. Inside: share of "
-        "the distances whose truth is within 1 and 1.96 stated standard errors."
-    )
-    print_table("Against the film's truth", ("", "the paper's method", "standoff"), rows, caption)
+    columns = ("", "the paper's method", "standoff")
+    print_table("Against the film's truth", columns, rows, f"From the same detections. {_MEANING}")
+
+
+def print_score(score: ClipScore) -> None:
+    """Print who was found, what was said of it, and how far off the run is."""
+    _print_found(score)
+    _print_hazards(score)
+    print_table("Against the clip's truth", ("", "this run"), _compared(score), _MEANING)
 
 
 def _print_found(score: ClipScore) -> None:

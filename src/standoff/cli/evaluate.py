@@ -7,13 +7,14 @@ from typing import Annotated
 
 import typer
 
-from standoff.cli import evaluate_coverage, evaluate_detection, evaluate_paper, evaluate_watched
+from standoff.cli import evaluate_coverage, evaluate_detection, evaluate_paper, evaluate_run, evaluate_watched
 from standoff.cli.calibrate import pattern_size
 from standoff.cli.numbers import frame_range
 
 app = typer.Typer(help="Measure accuracy on data with known truth.", no_args_is_help=True)
 app.command("paper")(evaluate_paper.paper)
 app.command("detection")(evaluate_detection.detection)
+app.command("run")(evaluate_run.evaluate_run)
 app.command("coverage")(evaluate_coverage.coverage)
 app.command("watched")(evaluate_watched.watched)
 _Json = Annotated[Path | None, typer.Option("--json", help="Also write the result as JSON; - prints only that.")]

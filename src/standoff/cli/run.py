@@ -15,7 +15,7 @@ from standoff.core.errors import ConfigError, StandoffError
 from standoff.core.outputs import OUTPUTS
 
 if TYPE_CHECKING:
-    from standoff.core.types import FrameResult, Severity
+    from standoff.core.types import Severity
     from standoff.monitor import Run
 
 
@@ -148,13 +148,12 @@ class _StopRequest:
         signal.signal(number, signal.SIG_DFL)
 
 
-def run_to_end(opened: Run, *, quiet: bool, on_result: Callable[[FrameResult], None] | None = None) -> None:
+def run_to_end(opened: Run, *, quiet: bool) -> None:
     """Go through a run with a progress bar; Ctrl-C ends it after the frame in hand.
 
     Args:
         opened: The run.
         quiet: No progress bar.
-        on_result: Called with each frame's result.
     """
     from standoff.cli.console import progress_bar
     from standoff.core.compiled import when_compiling
@@ -166,9 +165,7 @@ def run_to_end(opened: Run, *, quiet: bool, on_result: Callable[[FrameResult], N
             when_compiling(lambda: bar.console.print("compiling the geometry for this processor: half a minute, once"))
         task = bar.add_task("monitoring", total=opened.source.frame_count, rate=0.0)
         started = monotonic()
-        for count, result in enumerate(results, start=1):
-            if on_result is not None:
-                on_result(result)
+        for count, _ in enumerate(results, start=1):
             bar.update(task, completed=count, rate=count / (monotonic() - started))
             if stop.received:
                 break

@@ -31,7 +31,7 @@ from standoff.clips.clip_folder import (
     VIDEO_FILE,
     read_clip_table,
 )
-from standoff.clips.columns import Column, Columns, chosen_rows, columns_of, read_columns, schema_of
+from standoff.clips.columns import FRAME_COLUMNS, Column, Columns, chosen_rows, columns_of, read_columns, schema_of
 from standoff.clips.detections import (
     COLUMNS,
     DETECTIONS_FILE,
@@ -41,6 +41,7 @@ from standoff.clips.detections import (
     metadata_of,
     read_detections,
 )
+from standoff.clips.ground_maps import MAP_COLUMNS, map_of, map_values
 from standoff.clips.run_folder import RunFolder, RunTable
 
 __all__ = [
@@ -55,6 +56,8 @@ __all__ = [
     "DEVICES_FILE",
     "DEVICES_SCHEMA",
     "FOOT_COLUMNS",
+    "FRAME_COLUMNS",
+    "MAP_COLUMNS",
     "NOISY_DETECTIONS_FILE",
     "NOISY_DETECTIONS_SCHEMA",
     "PAIRS_FILE",
@@ -80,6 +83,8 @@ __all__ = [
     "columns_of",
     "is_recording",
     "load_clip",
+    "map_of",
+    "map_values",
     "metadata_of",
     "read_clip_table",
     "read_columns",

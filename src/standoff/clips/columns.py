@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy.typing as npt
 import pyarrow as pa
@@ -19,6 +19,15 @@ Column = tuple[str, pa.DataType, str, str]
 
 Columns = Mapping[str, npt.NDArray[Any]]
 """By name, all of one length."""
+
+FRAME_COLUMNS: Final[tuple[Column, ...]] = (
+    ("stream_id", pa.string(), "", "name of the stream"),
+    ("frame", pa.int64(), "", "index in the source, from 0, skipped frames counted"),
+    ("time_s", pa.float64(), "s", "presentation timestamp from the start of the source"),
+    ("captured_at", pa.timestamp("us", tz="UTC"), "", "when the picture was taken; null: nobody tells"),
+    ("told_by", pa.string(), "", "who tells when it was taken: file, arrival, rtcp, telemetry; null: nobody"),
+)
+"""Which frame a row is of, and when: the first columns of every table of a run."""
 
 
 def schema_of(columns: Sequence[Column], about: Mapping[str, str] | None = None) -> pa.Schema:

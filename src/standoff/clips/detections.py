@@ -18,7 +18,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet
 
-from standoff.clips.columns import Column, column_names
+from standoff.clips.columns import FRAME_COLUMNS, Column, column_names
 from standoff.core.boxes import unknown_points
 from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.errors import DataError
@@ -29,10 +29,10 @@ DETECTIONS_FILE: Final = "detections.parquet"
 FORMAT: Final = 1
 METADATA_KEY: Final = "standoff_detections"
 
+_DETECTED: Final[Column] = ("detected", pa.bool_(), "", "false: the detector rested in this frame")
 _FRAME: Final[tuple[Column, ...]] = (
-    ("frame", pa.int64(), "", "index in the source, from 0, skipped frames counted"),
-    ("time_s", pa.float64(), "s", "presentation timestamp from the start of the source"),
-    ("detected", pa.bool_(), "", "false: the detector rested in this frame"),
+    *(column for column in FRAME_COLUMNS if column[0] in ("frame", "time_s")),
+    _DETECTED,
 )
 _BOX: Final[tuple[Column, ...]] = (
     ("x1_px", pa.float64(), "px", "left edge of the box; null in the one row of a frame without detections"),
@@ -55,14 +55,14 @@ FOOT_COLUMNS: Final[tuple[Column, ...]] = (
     ("foot_cov_px2", pa.float64(), "px^2", "covariance of foot_x_px and foot_y_px"),
 )
 COLUMNS: Final[tuple[Column, ...]] = (
-    ("stream_id", pa.string(), "", "name of the stream"),
-    *_FRAME,
+    *FRAME_COLUMNS,
+    _DETECTED,
     *_BOX,
     ("class_id", pa.int64(), "", "number of the class in this version of standoff"),
     *FOOT_COLUMNS,
 )
 """What is written. Readers ask by name and want `_FRAME` and `_BOX` only; there may be more columns in later files, and
-files from before ground points lack those."""
+earlier ones lack the ground points, or who tells when a picture was taken."""
 
 _RECORD_AGAIN: Final = "repeat `standoff run` with detections among its outputs"
 

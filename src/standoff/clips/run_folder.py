@@ -1,9 +1,9 @@
-"""The folder of a run, read again: its record and its tables. Its detections are in `standoff.clips.detections`."""
+"""The folder of a run, read again: its record, tables and hazards; `standoff.clips.detections` has its detections."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Final, Literal
 
@@ -12,12 +12,16 @@ import numpy as np
 from standoff.clips.columns import Columns, chosen_rows, read_columns
 from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.errors import DataError
-from standoff.files.json_text import read_json
+from standoff.core.hazards import Hazard
+from standoff.files.json_text import parse_json, read_json
+from standoff.files.plain_text import read_text
 
 RunTable = Literal["tracks", "proximity", "frames"]
 """Of a run; what each column holds stands in the file itself."""
 
 _RECORD: Final = "run.json"
+_HAZARDS: Final = "hazards.jsonl"
+_UNKNOWN_NUMBERS: Final = ("distance_m", "gap_m", "sigma_m", "breach_now", "breach_ahead")
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,3 +80,28 @@ class RunFolder:
             )
         class_id = np.array([CLASS_BY_NAME[name].id for name in names.tolist()], dtype=np.int64)[which]
         return chosen_rows({**tracks, "class_id": class_id}, np.argsort(tracks["frame"], kind="stable"))
+
+    def hazards(self) -> Mapping[int | None, Sequence[Hazard]]:
+        """Return the events by the frame after which they were said, in their order; None: before the first frame.
+
+        Raises:
+            DataError: The file is missing or not what it should be.
+        """
+        path = self.folder / _HAZARDS
+        events: dict[int | None, list[Hazard]] = {}
+        lines = read_text(path, "a run's hazards", DataError).split("\n")
+        for number, line in enumerate(filter(None, lines), start=1):
+            told = parse_json(line, "a hazard's event", f"{path}, line {number}")
+            try:
+                events.setdefault(told["frame"], []).append(_event(told))
+            except (KeyError, TypeError, ValueError) as error:
+                raise DataError(
+                    expected="a hazard's event", found=f"{error} in {path}, line {number}", fix="repeat `standoff run`"
+                ) from error
+        return events
+
+
+def _event(told: Mapping[str, Any]) -> Hazard:
+    known = {field.name: told[field.name] for field in fields(Hazard) if field.name in told}
+    numbers = {name: np.nan if known[name] is None else float(known[name]) for name in _UNKNOWN_NUMBERS}
+    return Hazard(**{**known, **numbers, "track_ids": tuple(known["track_ids"])})

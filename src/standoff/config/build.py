@@ -173,7 +173,7 @@ def build_watcher(settings: Settings, detector: Detector) -> GroundWatcher:
     worker = CLASS_BY_NAME["worker"]
     return GroundWatcher(
         settings.watched,
-        WorkerFinding.of_detector(detector.description),
+        WorkerFinding.of_detector(detector.describe()),
         settings.locate.radius_m.get(worker.name, worker.action_radius_m),
     )
 

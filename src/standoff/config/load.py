@@ -177,6 +177,24 @@ def settings_from(from_file: Mapping[str, Any], origin: str, overrides: Mapping[
         raise config_error(origin, error) from error
 
 
+def recorded_settings(record: Mapping[str, Any], run: str) -> Settings:
+    """Return the settings that a run was made with; the environment of today does not change them.
+
+    Args:
+        record: What the run says of itself.
+        run: Where it is, for the message.
+
+    Raises:
+        ConfigError: It has no settings, or another version's.
+    """
+    settings = record.get("settings")
+    if not isinstance(settings, Mapping) or not settings:
+        raise ConfigError(
+            expected=f"the settings of the run in {run}", found="none", fix="give the folder that `standoff run` wrote"
+        )
+    return settings_from({}, f"the record of {run}", settings)
+
+
 def resolved(settings: Settings) -> dict[str, Any]:
     """Return the settings as plain JSON values, every default filled in."""
     return settings.model_dump(mode="json")

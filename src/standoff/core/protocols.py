@@ -37,15 +37,17 @@ _NOTHING: Mapping[str, Any] = {}
 class Described(Protocol):
     """Something that has a word on itself in the record of a run."""
 
-    @property
-    def description(self) -> Mapping[str, Any]:
-        """What there is to say of it so far, asked again at the end; `warnings` in it are clauses for people."""
+    def describe(self) -> Mapping[str, Any]:
+        """Return what there is to say of it so far; `warnings` in it are clauses for people.
+
+        A run asks at its start and again at its end: what was lost or seen meanwhile is known only then.
+        """
         return _NOTHING
 
 
 @runtime_checkable
 class Source(Described, Protocol):
-    """Where frames come from."""
+    """Where frames come from; nothing is opened before the first question, which raises what is wrong with it."""
 
     @property
     def size_px(self) -> tuple[int, int]:

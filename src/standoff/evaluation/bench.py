@@ -95,7 +95,7 @@ def bench_source(
     with TemporaryDirectory() as folder:
         drawing = {"drawing": DrawingSink(settings.video)} if "video" in settings.outputs else {}
         run = open_run(source, Path(folder) / "run", settings, more_sinks=drawing, overlaps=False)
-        described = dict(run.source.description)
+        described = dict(run.source.describe())
         stages = collect_times(run, frames)
         whole = time_through(open_run(source, Path(folder) / "whole", settings), frames)
     return BenchReport(
@@ -125,7 +125,7 @@ def _detection_baselines(source: Path, settings: Settings, darknet: tuple[Path, 
     if darknet is None:
         return
     detector = OnnxDetector(find_model(settings.model), settings.detect)
-    width_px, height_px = detector.description["input_size_px"]
+    width_px, height_px = detector.describe()["input_size_px"]
     with open_source(source, fps=settings.source.fps, start_s=settings.source.start_s) as opened:
         frames = list(islice(opened, _DETECTION_FRAMES))
     yield detection_baseline(detector, frames, *darknet, size_px=(width_px, height_px))

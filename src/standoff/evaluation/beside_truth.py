@@ -46,6 +46,7 @@ _WHOLE_SHARE = 0.9
 _BEYOND_EDGE_PX = 1.0
 _SAME_TIME_S = 0.005
 """Presentation times are whole ticks of a clock; frames are at least three times as far apart."""
+_ITS_OWN_CLIP = "give each run with the clip that it is of"
 
 
 _Samples = TypeVar("_Samples")
@@ -110,7 +111,8 @@ def read_beside_truth(
     size_px = camera.width_px, camera.height_px
     truth = _read_truth(clip, size_px, truth_columns)
     record = told.record()
-    _check_same_film(frames, truth, record, run, clip)
+    _check_same_frames(frames, truth, run, clip)
+    check_same_film(record, run, clip)
     truth, tracks = _shown(truth, frames), told.tracks(_TRACKS)
     track_row, *ends = _match(truth, tracks)
     track_id = _ids(tracks, track_row)
@@ -168,17 +170,20 @@ def _sights(truth: Columns, size_px: IntArray) -> IntArray:
     return np.where(inside, np.where(truth["visible_share"] < _WHOLE_SHARE, HIDDEN, WHOLE), CUT_OFF)
 
 
-def _check_same_film(frames: Columns, truth: Columns, record: Mapping[str, Any], run: Path, clip: Path) -> None:
-    fix = "give each run with the clip that it is of"
+def check_same_film(record: Mapping[str, Any], run: Path, clip: Path) -> None:
+    """Raise DataError where a run says that it is of a film with other content than a clip's."""
+    video, recorded = clip / VIDEO_FILE, (record.get("source") or {}).get("fingerprint")
+    if recorded is not None and video.is_file() and recorded != fingerprint([video]):
+        found = f"{run}, which is of a film with other content"
+        raise DataError(expected=f"a run of {video}", found=found, fix=_ITS_OWN_CLIP)
+
+
+def _check_same_frames(frames: Columns, truth: Columns, run: Path, clip: Path) -> None:
     place = np.minimum(np.searchsorted(truth["frame"], frames["frame"]), len(truth["frame"]) - 1)
     known = truth["frame"][place] == frames["frame"]
     if not known.all() or not (np.abs(truth["time_s"][place] - frames["time_s"]) <= _SAME_TIME_S).all():
-        raise DataError(
-            expected=f"frames of {clip}", found=f"frames in {run} that it does not have at those times", fix=fix
-        )
-    video, recorded = clip / VIDEO_FILE, (record.get("source") or {}).get("fingerprint")
-    if recorded is not None and video.is_file() and recorded != fingerprint([video]):
-        raise DataError(expected=f"a run of {video}", found=f"{run}, which is of a film with other content", fix=fix)
+        found = f"frames in {run} that it does not have at those times"
+        raise DataError(expected=f"frames of {clip}", found=found, fix=_ITS_OWN_CLIP)
 
 
 def _shown(truth: Columns, frames: Columns) -> Columns:

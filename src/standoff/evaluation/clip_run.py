@@ -1,4 +1,4 @@
-"""Score a run on a clip with exact truth while it goes on: who is found, how far off distances are, what is said."""
+"""Score a run on a clip with exact truth: who is found, how far off distances are, what is said."""
 
 from __future__ import annotations
 
@@ -12,17 +12,19 @@ from typing import Any, Literal
 
 import numpy as np
 
-from standoff.clips import Clip
-from standoff.config import Settings
+from standoff.clips import Clip, RunFolder, read_detections
+from standoff.config import Settings, recorded_settings
 from standoff.core.errors import DataError
-from standoff.core.types import FrameResult, Severity
+from standoff.core.types import Severity
+from standoff.evaluation.beside_truth import check_same_film
 from standoff.evaluation.matching import NOTHING
 from standoff.evaluation.paper.answers import both_radii_m
 from standoff.evaluation.paper.localisation import ClassLocalisation, score_localisation
 from standoff.evaluation.paper.map_only import MapScore, score_map
 from standoff.evaluation.paper.monitor_setup import MonitorSetup, build_monitor, settings_for
-from standoff.evaluation.paper.monitored_clip import Notes, open_clip_video
+from standoff.evaluation.paper.monitored_clip import Notes, check_frame, open_clip_video
 from standoff.evaluation.paper.pairs import PairGroup, group_pairs, pair_series
+from standoff.evaluation.run_frames import RunFrame, read_run_frames
 from standoff.monitor import Run
 
 Pair = tuple[int, int]
@@ -99,6 +101,27 @@ class _Said:
     first_s: dict[Severity, float]
 
 
+def score_run(run: Path, clip: Clip) -> ClipScore:
+    """Score what a run wrote into its folder.
+
+    Args:
+        run: Folder with the record, `tracks`, `proximity`, `frames`, `detections` and `hazards`.
+        clip: What the run is of, with a reference object.
+
+    Raises:
+        DataError: A file is missing or not what it should be, the run is of another film or not of all of it, or there
+            is no reference object.
+        ConfigError: The record's settings are of another version.
+    """
+    record, seen = RunFolder(run).record(), read_detections(run)
+    check_same_film(record, run, clip.folder)
+    witness = ClipWitness(clip, recorded_settings(record, str(run)), seen.size_px)
+    for said in read_run_frames(run, seen):
+        check_frame(clip, said.index)
+        witness.take(said)
+    return witness.score()
+
+
 def score_papers_method(clip: Clip, recording: Path, on_frame: Callable[[], None] | None = None) -> ClipScore:
     """Score the paper's method, exactly as printed, on the detections of a run of the clip.
 
@@ -119,14 +142,14 @@ def score_papers_method(clip: Clip, recording: Path, on_frame: Callable[[], None
         witness = ClipWitness(clip, settings_for(clip, setup), source.size_px)
         with closing(iter(Run(source, build_monitor(clip, setup, source)))) as results:
             for result in results:
-                witness.take(result)
+                witness.take(RunFrame.of_result(result))
                 if on_frame is not None:
                     on_frame()
     return witness.score()
 
 
 class ClipWitness:
-    """Watches a run on a clip frame by frame; ask for the `score` at its end.
+    """Files a run on a clip frame by frame; ask for the `score` at its end.
 
     Args:
         clip: The truth, with a reference object.
@@ -147,26 +170,31 @@ class ClipWitness:
         self._entities: dict[int, Counter[int]] = {}
         self._said: dict[str, _Said] = {}
 
-    @property
-    def has_seen_all(self) -> bool:
-        """Whether every frame of the clip was taken; the score is of the whole clip."""
-        return self._notes.taken == self._clip.frame_count
-
-    def take(self, result: FrameResult) -> None:
+    def take(self, said: RunFrame) -> None:
         """Take the next frame."""
-        track_row = self._notes.take(result)
+        track_row = self._notes.take(said)
         for entity in np.flatnonzero(track_row != NOTHING).tolist():
-            track = int(result.tracks.track_id[track_row[entity]])
+            track = int(said.track_id[track_row[entity]])
             self._entities.setdefault(track, Counter())[entity] += 1
-        for event in result.hazards:
+        for event in said.hazards:
             if event.rule == "proximity" and event.severity != "unknown":
                 first, second = event.track_ids
-                said = self._said.setdefault(event.hazard_id, _Said((first, second), {}))
-                said.first_s.setdefault(event.severity, event.time_s)
+                of_hazard = self._said.setdefault(event.hazard_id, _Said((first, second), {}))
+                of_hazard.first_s.setdefault(event.severity, event.time_s)
 
     def score(self) -> ClipScore:
-        """Compare what was taken with the truth of the whole clip; see `has_seen_all`."""
+        """Compare what was taken with the truth of the whole clip.
+
+        Raises:
+            DataError: A frame of the clip was not taken.
+        """
         clip, watched = self._clip, self._notes.monitored
+        if self._notes.taken != clip.frame_count:
+            raise DataError(
+                expected=f"a run of all {clip.frame_count} frames of {clip.folder}",
+                found=f"one of {self._notes.taken}",
+                fix="repeat the run to its end, with every frame",
+            )
         said = self._said_of_entities()
         encounters = sorted(self._encounters(said), key=lambda one: one.start_s)
         return ClipScore(
@@ -174,14 +202,10 @@ class ClipWitness:
             frames_with_map=int(np.isfinite(watched.scale_m_per_px).sum()),
             map_only=score_map(clip, watched),
             classes=score_localisation(clip, watched),
-            pairs=self.score_pairs(),
+            pairs=group_pairs(pair_series(clip, watched, benchmark=False)),
             encounters=tuple(encounters),
             false_hazards=tuple(self._false_hazards(said, encounters)),
         )
-
-    def score_pairs(self) -> tuple[PairGroup, ...]:
-        """Compare the distances alone."""
-        return group_pairs(pair_series(self._clip, self._notes.monitored, benchmark=False))
 
     def _said_of_entities(self) -> dict[Pair, dict[Severity, float]]:
         """Return when each severity was first said of each pair of entities, or of NOTHING known."""

@@ -90,9 +90,8 @@ class Orientation:
             return -90 if flips_x else 90
         return 180 if flips_x else 0
 
-    @property
-    def description(self) -> dict[str, Any]:
-        """What is done to the stored picture, for the record."""
+    def describe(self) -> dict[str, Any]:
+        """Return what is done to the stored picture, for the record."""
         return {"rotation_deg": self.rotation_deg, "mirrored": self.is_mirrored}
 
     def size_px(self, stored_px: tuple[int, int]) -> tuple[int, int]:

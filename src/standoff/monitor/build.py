@@ -12,7 +12,7 @@ from standoff.stages.proximity import side_classes
 
 def _check_visible(settings: Settings, detector: Detector) -> None:
     """Raise ConfigError where the model can never show what is to be measured: its silence would read as safety."""
-    class_map = detector.description.get("class_map")
+    class_map = detector.describe().get("class_map")
     if class_map is None:
         return
     visible = frozenset(class_map.values())

@@ -58,11 +58,11 @@ def open_run(
     monitor = build_monitor(settings, frames.camera_prior)
     monitor.prepare(frames.size_px)
     if isinstance(monitor.detector, RecordedDetector):
-        monitor.detector.check_source(frames.description)
+        monitor.detector.check_source(frames.describe())
     extra = {name: build_replacement(name, one, Sink) for name, one in settings.extra_outputs.items()}
     wanted = Wanted(
-        source=frames.description,
-        detector=monitor.detector.description,
+        source=frames.describe(),
+        detector=monitor.detector.describe(),
         tables=settings.tables,
         video=settings.video,
         report=settings.report,

@@ -6,11 +6,11 @@ import logging
 from collections import defaultdict
 from collections.abc import Generator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import replace
 from typing import Any
 
-from standoff.core.errors import OutputError
+from standoff.core.errors import OutputError, StandoffError
 from standoff.core.protocols import Described, Sink, Source
 from standoff.core.stage_durations import Durations
 from standoff.core.types import FrameResult, Outcome
@@ -128,9 +128,10 @@ class Run:
         return replace(result, stage_ms=stage_ms)
 
     def _end(self, outcome: Outcome) -> None:
-        # What the source lost, and what the stages saw, is known only now.
-        known = {} if self.folder is None else self.folder.record.about
-        about = {**known, **describe_run(self.source, self.monitor)}
+        about = {} if self.folder is None else self.folder.record.about
+        # What the source lost, and what the stages saw, is known only now; one that cannot be opened says nothing.
+        with suppress(StandoffError):
+            about = {**about, **describe_run(self.source, self.monitor)}
         ended = replace(outcome, about=about, counts=self.monitor.counts)
         self._fan_out.close(ended)
         self.source.close()
@@ -146,15 +147,15 @@ class Run:
 def describe_run(source: Source, monitor: Monitor) -> dict[str, Any]:
     """Return what is known of a run, for its record and its report: before the first frame, or after the last."""
     return {
-        "source": source.description,
-        "model": monitor.detector.description,
-        "ground": monitor.ground.description,
-        "watched": monitor.watcher.description,
-        "alarms": monitor.hazard.description.get("alarms"),
+        "source": source.describe(),
+        "model": monitor.detector.describe(),
+        "ground": monitor.ground.describe(),
+        "watched": monitor.watcher.describe(),
+        "alarms": monitor.hazard.describe().get("alarms"),
         "warnings": warnings_of(source, *monitor.stages.values()),
     }
 
 
 def warnings_of(*parts: Described) -> list[str]:
     """Return what is odd about some parts and about what they saw so far, a clause each."""
-    return [text for part in parts for text in part.description.get("warnings", ())]
+    return [text for part in parts for text in part.describe().get("warnings", ())]

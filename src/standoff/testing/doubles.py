@@ -22,9 +22,8 @@ class ScriptedDetector(Detector):
     def __init__(self, script: Mapping[int, Detections], description: Mapping[str, Any] | None = None) -> None:
         self._script, self._description = dict(script), dict(description or {})
 
-    @property
-    def description(self) -> Mapping[str, Any]:
-        """As it was given."""
+    def describe(self) -> Mapping[str, Any]:
+        """Return as it was given."""
         return self._description
 
     def detect(self, frame: Frame) -> Detections:
@@ -59,9 +58,8 @@ class DrawnFilm(Source):
         self._fails_after, self._error = fails_after, error or OSError("the film breaks here")
         self.shown, self.is_closed = 0, False
 
-    @property
-    def description(self) -> Mapping[str, Any]:
-        """What it is, and how many pictures it has given so far."""
+    def describe(self) -> Mapping[str, Any]:
+        """Return what it is, and how many pictures it has given so far."""
         return {"kind": "drawn film", "size_px": list(self.size_px), "shown": self.shown}
 
     @property

@@ -136,8 +136,7 @@ class ShiftedBoxes(protocols.Detector):
         self._truth = TrueBoxes(clip)
         self._sees = sees
 
-    @property
-    def description(self) -> dict[str, dict[str, str]]:
+    def describe(self) -> dict[str, dict[str, str]]:
         return {"class_map": {"a": "worker", "b": self._sees}}
 
     def detect(self, frame: Frame) -> Detections:

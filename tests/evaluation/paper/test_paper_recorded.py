@@ -24,7 +24,7 @@ def record_truth(clip_folder: Path, run: Path) -> Path:
     detector = TrueBoxes(clip)
     run.mkdir()
     with open_clip_video(clip) as source:
-        sink = TableSink(run / "detections.parquet", detections_table(source.description, detector.description))
+        sink = TableSink(run / "detections.parquet", detections_table(source.describe(), detector.describe()))
         for frame in source:
             sink.write(replace(any_result, frame=frame, detections=detector.detect(frame)))
     sink.close(Outcome("complete"))

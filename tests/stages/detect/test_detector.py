@@ -73,8 +73,8 @@ def test_a_class_may_have_its_own_threshold(make_model: MakeModel) -> None:
 def test_a_label_that_is_ignored_gives_no_detection_but_is_listed(make_model: MakeModel) -> None:
     detector = OnnxDetector(make_model(("person", "kite"), (64, 64)))
     assert len(detector.detect(_frame((64, 64), (8, 8, 8, PURPLE)))) == 0
-    assert detector.description["class_map"] == {"person": "worker"}
-    assert detector.description["ignored_labels"] == ["kite"]
+    assert detector.describe()["class_map"] == {"person": "worker"}
+    assert detector.describe()["ignored_labels"] == ["kite"]
 
 
 def test_two_labels_of_one_class_give_one_box(make_model: MakeModel) -> None:
@@ -125,7 +125,7 @@ def test_detection_never_converts_full_size_pixels(make_model: MakeModel) -> Non
 
 def test_the_description_says_what_was_used(make_model: MakeModel) -> None:
     model = make_model(LABELS, (96, 64))
-    description = OnnxDetector(model, DetectParams(provider="cpu", intra_op_threads=1)).description
+    description = OnnxDetector(model, DetectParams(provider="cpu", intra_op_threads=1)).describe()
     assert description["input_size_px"] == [96, 64]
     assert description["classes"] == ["person", "car"]
     assert description["class_map"] == {"person": "worker", "car": "vehicle"}

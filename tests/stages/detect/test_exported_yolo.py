@@ -62,7 +62,7 @@ def test_columns_of_boxes_and_probabilities_are_read(
     rows = np.concatenate([boxes / scale, chances, more], axis=1)
     model = save_exported(tmp_path / "m.onnx", rows.T[None], size_px, task)
     _same(_found(model, size_px), boxes, chances)
-    description = OnnxDetector(model).description
+    description = OnnxDetector(model).describe()
     assert (description["family"], description["task"]) == ("yolov8", task)
     assert bool(description["warnings"]) == (unit == "parts")
 
@@ -80,7 +80,7 @@ def test_a_table_that_was_turned_over_is_read_as_the_columns_that_it_was(
     rows = np.concatenate([boxes / scale, chances, np.zeros((cells, MORE[task]))], axis=1)
     model = save_exported(tmp_path / "m.onnx", rows[None], size_px, task)
     _same(_found(model, size_px), boxes, chances)
-    assert OnnxDetector(model).description["family"] == "yolov8"
+    assert OnnxDetector(model).describe()["family"] == "yolov8"
 
 
 @pytest.mark.parametrize("task", ["detect", "segment"])
@@ -98,9 +98,9 @@ def test_rows_with_objectness_are_read(tmp_path: Path, task: str, size_px: tuple
     model = save_exported(tmp_path / "m.onnx", rows[None], size_px, task)
     _same(_found(model, size_px), boxes, objectness * chances)
     detector = OnnxDetector(model)
-    assert detector.description["family"] == "yolov5"
+    assert detector.describe()["family"] == "yolov5"
     told = ["the boxes of m.onnx come as parts of its input, 0 to 1, not in pixels: read as such"]
-    assert detector.description["warnings"] == (told if unit == "parts" else [])
+    assert detector.describe()["warnings"] == (told if unit == "parts" else [])
 
 
 @pytest.mark.parametrize("task", ["detect", "segment", "pose"])
@@ -127,7 +127,7 @@ def test_ultralytics_rt_detr_is_read_in_a_stretched_picture(tmp_path: Path, size
     _same(_found(model, size_px), boxes, chances)
     (tall,) = {OnnxDetector(model, EVERYTHING).detect(empty((size_px[0], 9 * size_px[1]))).xyxy_px.max()}
     assert tall > 5 * size_px[1], "boxes reach over the whole height"
-    assert OnnxDetector(model).description["warnings"] == []
+    assert OnnxDetector(model).describe()["warnings"] == []
 
 
 @pytest.mark.parametrize("layout", ["columns", "ends"])
@@ -219,7 +219,7 @@ def test_rows_that_turn_out_not_to_be_choices_are_an_error(tmp_path: Path, row: 
 )
 def test_the_models_of_public_reports_find_what_they_say(shared_data: Path, name: str, classes: list[str]) -> None:
     detector = OnnxDetector(shared_data / "public_reports" / "onnx" / f"{name}.onnx", DetectParams(score_threshold=0.3))
-    assert detector.description["classes"] == classes
+    assert detector.describe()["classes"] == classes
     found = detector.detect(empty((320, 320)))
     # The surest stands in the middle, 30 px wide and 60 high; RT-DETR's is a tenth by a fifth.
     expected = [144, 128, 176, 192] if name == "rtdetr_ultra" else [145, 130, 175, 190]

@@ -183,7 +183,7 @@ def test_the_record_says_what_family_it_was(tmp_path: Path) -> None:
     model = describe(
         save_constant(tmp_path / "m.onnx", {"rows": rows}, (64, 64)), "family: yolov3\nclasses: [car, a, b]"
     )
-    description = OnnxDetector(model).description
+    description = OnnxDetector(model).describe()
     assert description["family"] == "yolov3"
     assert description["input_size_px"] == [64, 64]
     json.dumps(description)

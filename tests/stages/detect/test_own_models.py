@@ -180,11 +180,11 @@ def _card(path: Path, card: ModelCard) -> Path:
 
 def test_a_file_tells_how_small_a_worker_it_finds_if_somebody_measured_it(tmp_path: Path) -> None:
     path = _save_own(tmp_path / "m.onnx", np.zeros((1, 4, 8), np.float32), (64, 64))
-    assert not WorkerFinding.of_detector(OnnxDetector(path).description).measured
+    assert not WorkerFinding.of_detector(OnnxDetector(path).describe()).measured
     told = {"height_px": (10.0, 20.0), "share": (0.5, 0.9)}
     _card(path, ModelCard(LABELS, (), (64, 64), {}, told))
     detector = OnnxDetector(path, DetectParams(slices=(2, 1), slice_overlap=0.0))
-    finding = WorkerFinding.of_detector(detector.description)
+    finding = WorkerFinding.of_detector(detector.describe())
     assert finding == WorkerFinding((10.0, 20.0), (0.5, 0.9), (64, 64), (0.5, 1.0), measured=True)
 
 

@@ -110,4 +110,4 @@ def test_another_network_in_its_place_is_refused(tmp_path: Path) -> None:
 def test_the_detectors_description_names_the_network(points_file: Path, tmp_path: Path) -> None:
     model = write_detector(tmp_path)
     for name, expected in ((str(points_file), points_file.name), ("none", None)):
-        assert OnnxDetector(model, DetectParams(ground_points=name)).description["ground_points"] == expected
+        assert OnnxDetector(model, DetectParams(ground_points=name)).describe()["ground_points"] == expected

@@ -67,7 +67,7 @@ def test_another_source_is_refused_before_a_frame_is_read(detector: RecordedDete
 
 
 def test_the_description_names_the_recording_and_the_true_detector(detector: RecordedDetector, tmp_path: Path) -> None:
-    about = detector.description
+    about = detector.describe()
     assert about["kind"] == "recorded"
     assert about["file"] == str(tmp_path / "detections.parquet")
     assert about["detector"]["model"] == "yolo.onnx"

@@ -72,7 +72,7 @@ def test_layouts_of_one_shape_are_told_apart_by_their_numbers(tmp_path: Path) ->
 
     def family(rows: Array, names: tuple[str, ...], **more: str) -> str:
         save_constant(model, {"output0": rows.astype(np.float32)}, size_px)
-        return str(OnnxDetector(tell(model, metadata(size_px, names, **more))).description["family"])
+        return str(OnnxDetector(tell(model, metadata(size_px, names, **more))).describe()["family"])
 
     cells = 64 + 16 + 4
     boxes = random_boxes(random, 3 * cells, size_px)
@@ -100,16 +100,16 @@ def test_an_open_input_takes_the_size_that_the_metadata_or_the_description_says(
     with pytest.raises(ModelError, match="no input_size, which the graph leaves open; such as `input_size: 640x640`"):
         OnnxDetector(model)
     describe(model, "input_size: 64x96")
-    assert OnnxDetector(model).description["input_size_px"] == [64, 96]
+    assert OnnxDetector(model).describe()["input_size_px"] == [64, 96]
     model.with_suffix(".yaml").unlink()
     tell(model, metadata((96, 64)))
-    assert OnnxDetector(model).description["input_size_px"] == [96, 64]
+    assert OnnxDetector(model).describe()["input_size_px"] == [96, 64]
 
 
 def test_a_description_that_contradicts_the_model_gives_way_and_is_told(tmp_path: Path) -> None:
     rows = np.concatenate([random_boxes(np.random.default_rng(7), 84, (64, 64)), np.full((84, 3), 0.5)], axis=1).T[None]
     model = describe(save_exported(tmp_path / "m.onnx", rows, (64, 64)), f"family: yolov3\nclasses: {[*NAMES]}")
-    description = OnnxDetector(model).description
+    description = OnnxDetector(model).describe()
     assert description["family"] == "yolov8"
     assert description["warnings"] == [
         "m.yaml says family: yolov3, but the outputs of m.onnx are those of family: yolov8, as its own metadata says; "
@@ -123,7 +123,7 @@ def test_a_description_that_contradicts_the_model_gives_way_and_is_told(tmp_path
 def test_classes_of_a_description_go_before_those_of_the_model(tmp_path: Path) -> None:
     rows = np.concatenate([random_boxes(np.random.default_rng(8), 84, (64, 64)), np.full((84, 3), 0.5)], axis=1).T[None]
     model = describe(save_exported(tmp_path / "m.onnx", rows, (64, 64)), "classes: [kite, excavator, person]")
-    assert OnnxDetector(model).description["class_map"] == {"excavator": "excavator", "person": "worker"}
+    assert OnnxDetector(model).describe()["class_map"] == {"excavator": "excavator", "person": "worker"}
 
 
 @pytest.mark.parametrize(
@@ -147,7 +147,7 @@ def test_the_hint_for_a_model_that_says_nothing_leads_to_one_that_works(
     assert yaml.safe_load(hint)["family"] == family
     describe(tmp_path / "m.onnx", hint)
     (tmp_path / "labels.txt").write_text("\ufeff" + "\n".join(NAMES), encoding="utf-8")
-    description = OnnxDetector(tmp_path / "m.onnx").description
+    description = OnnxDetector(tmp_path / "m.onnx").describe()
     assert (description["family"], description["classes"]) == (family, [*NAMES])
 
 
@@ -168,7 +168,7 @@ def test_of_no_class_that_is_of_use_one_line_tells_what_to_say(tmp_path: Path) -
     line = str(caught.value)
     assert "kite 11 and 18 more. Say in a settings file which label is which class" in line
     assert "detect: {class_map: {kite 0: worker}}" in line
-    found = OnnxDetector(model, DetectParams(class_map={"kite 29": "worker"})).description
+    found = OnnxDetector(model, DetectParams(class_map={"kite 29": "worker"})).describe()
     assert found["class_map"] == {"kite 29": "worker"}
 
 

@@ -32,5 +32,5 @@ def test_a_detector_that_the_installation_lacks_is_one_line(
 
 @pytest.mark.parametrize("name", SHIPPED_MODELS)
 def test_a_shipped_detector_knows_all_classes_of_the_site(name: str) -> None:
-    known = set(OnnxDetector(find_model(name)).description["class_map"].values())
+    known = set(OnnxDetector(find_model(name)).describe()["class_map"].values())
     assert known == set(CLASS_BY_NAME)

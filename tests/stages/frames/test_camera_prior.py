@@ -75,7 +75,7 @@ def test_films_are_less_certain_than_photographs() -> None:
 def test_a_film_without_a_word_of_its_camera_has_any_drones(tmp_path: Path) -> None:
     with open_source(write_video(tmp_path / "film.mp4", 3, WIDE)) as source:
         assert source.camera_prior.origin == "a drone's usual lens"
-        assert source.description["telemetry"] == {"origin": "none"}
+        assert source.describe()["telemetry"] == {"origin": "none"}
         assert [frame.telemetry for frame in source] == [None] * 3
 
 
@@ -83,7 +83,7 @@ def test_a_films_own_header_names_its_drone(tmp_path: Path) -> None:
     film = write_video(tmp_path / "film.mp4", 3, Recipe(size_px=(160, 90), metadata={"comment": "DJI Mini3 Pro"}))
     with open_source(film) as source:
         assert source.camera_prior.origin == "DJI Mini 3 Pro"
-        assert source.description["camera"]["origin"] == "DJI Mini 3 Pro"
+        assert source.describe()["camera"]["origin"] == "DJI Mini 3 Pro"
 
 
 def _film(folder: Path, blocks: int = 2) -> Path:
@@ -97,8 +97,8 @@ def test_the_log_beside_a_film_gives_readings_and_focal_length(tmp_path: Path) -
         assert source.warnings == ()
         assert source.camera_prior.origin == "film.srt"
         assert source.camera_prior.camera.matrix[0, 0] == pytest.approx(24.0 / 36.0 * 160, rel=1e-3)
-        assert source.description["telemetry"]["origin"] == "film.srt"
-        assert "pitch_deg" in source.description["telemetry"]["readings"]
+        assert source.describe()["telemetry"]["origin"] == "film.srt"
+        assert "pitch_deg" in source.describe()["telemetry"]["readings"]
         frames = list(source)
     assert all(frame.telemetry is not None and frame.telemetry.time_s == frame.time_s for frame in frames)
 
@@ -108,10 +108,10 @@ def test_a_log_that_is_asked_for_comes_first_and_none_is_none(tmp_path: Path) ->
     other = tmp_path / "other.srt"
     other.write_text(block(0, focal="48.00") + block(1, focal="48.00"), encoding="utf-8")
     with open_source(film, telemetry=other) as source:
-        assert source.description["telemetry"]["origin"] == "other.srt"
+        assert source.describe()["telemetry"]["origin"] == "other.srt"
         assert source.camera_prior.camera.matrix[0, 0] == pytest.approx(48.0 / 36.0 * 160, rel=1e-3)
     with open_source(film, telemetry="none") as source:
-        assert source.description["telemetry"] == {"origin": "none"}
+        assert source.describe()["telemetry"] == {"origin": "none"}
         assert source.camera_prior.origin == "a drone's usual lens"
         assert [frame.telemetry for frame in source] == [None] * 20
 
@@ -122,7 +122,7 @@ def test_a_log_that_is_asked_for_and_cannot_be_used_is_an_error(tmp_path: Path, 
     if content is not None:
         log.write_text(content, encoding="utf-8")
     with pytest.raises(SourceError, match=r"asked\.srt is not used"):
-        open_source(film, telemetry=log)
+        open_source(film, telemetry=log).describe()
 
 
 def test_a_broken_log_beside_a_film_is_one_warning(tmp_path: Path) -> None:

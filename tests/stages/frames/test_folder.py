@@ -51,8 +51,8 @@ def test_a_part_keeps_its_indices(
         frames = list(source)
     assert [frame.index for frame in frames] == [index_in(frame.image) for frame in frames] == expected
     assert source.frame_count == len(expected)
-    assert source.description["kind"] == "image folder"
-    assert source.description["every"] == every
+    assert source.describe()["kind"] == "image folder"
+    assert source.describe()["every"] == every
 
 
 def test_what_file_managers_leave_behind_is_overlooked(tmp_path: Path) -> None:
@@ -109,7 +109,7 @@ def test_photographs_of_a_drone_read_as_opencv_reads_them(shared_data: Path, tmp
 
 def test_a_folder_needs_a_frame_rate(tmp_path: Path) -> None:
     with pytest.raises(SourceError, match=r"a folder has no clock.*--fps"):
-        open_source(fill(tmp_path / "site", 2))
+        open_source(fill(tmp_path / "site", 2)).describe()
 
 
 def test_strangers_are_named(tmp_path: Path) -> None:
@@ -117,7 +117,7 @@ def test_strangers_are_named(tmp_path: Path) -> None:
     for name in ("a.txt", "b.csv", "c.mp4", "d.zip"):
         (folder / name).write_text("x")
     with pytest.raises(SourceError, match=r"found a\.txt, b\.csv, c\.mp4 and 1 more") as caught:
-        open_source(folder, fps=1)
+        open_source(folder, fps=1).describe()
     assert "\n" not in str(caught.value)
 
 
@@ -125,12 +125,12 @@ def test_a_folder_inside_is_a_stranger_even_if_named_like_an_image(tmp_path: Pat
     folder = fill(tmp_path / "site", 2)
     (folder / "more.png").mkdir()
     with pytest.raises(SourceError, match=r"found more\.png"):
-        open_source(folder, fps=1)
+        open_source(folder, fps=1).describe()
 
 
 def test_an_empty_folder_is_refused(tmp_path: Path) -> None:
     with pytest.raises(SourceError, match="expected images in"):
-        open_source(tmp_path, fps=1)
+        open_source(tmp_path, fps=1).describe()
 
 
 @pytest.mark.parametrize("suffix", [".png", ".jpg", ".bmp", ".tif", ".webp"])
@@ -141,7 +141,7 @@ def test_a_corrupt_picture_is_named_before_anything_is_read(tmp_path: Path, suff
     content = path.read_bytes()
     path.write_bytes({"cut": content[: len(content) // 2], "text": b"not a picture\n" * 20, "empty": b""}[damage])
     with pytest.raises(SourceError, match=f"found shot1{suffix}: "):
-        open_source(folder, fps=1)
+        open_source(folder, fps=1).describe()
 
 
 def test_all_pictures_of_another_size_are_named_before_anything_is_read(tmp_path: Path) -> None:
@@ -150,7 +150,7 @@ def test_all_pictures_of_another_size_are_named_before_anything_is_read(tmp_path
         cv2.imwrite(str(folder / f"shot{index}.png"), coded_picture(index, 120, 80))
     found = r"120x80 at shot2\.png, 120x80 at shot3\.png, 120x80 at shot5\.png and 2 more"
     with pytest.raises(FrameSizeChanged, match=found):
-        open_source(folder, fps=1)
+        open_source(folder, fps=1).describe()
 
 
 def test_a_bad_picture_outside_the_part_that_is_wanted_does_no_harm(tmp_path: Path) -> None:
@@ -163,9 +163,9 @@ def test_a_bad_picture_outside_the_part_that_is_wanted_does_no_harm(tmp_path: Pa
     with open_source(folder, fps=1, every=2) as source:
         assert [frame.index for frame in source] == [0, 2, 4, 6]
     with pytest.raises(SourceError, match=r"shot5\.png: it is empty"):
-        open_source(folder, fps=1, start_s=4)
+        open_source(folder, fps=1, start_s=4).describe()
 
 
 def test_a_start_beyond_the_last_picture_is_refused(tmp_path: Path) -> None:
     with pytest.raises(SourceError, match=r"it lasts about 3\.0 s"):
-        open_source(fill(tmp_path / "site", 3), fps=1, start_s=3)
+        open_source(fill(tmp_path / "site", 3), fps=1, start_s=3).describe()

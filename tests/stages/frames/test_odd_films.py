@@ -35,7 +35,7 @@ def test_a_display_matrix_turns_and_mirrors_as_ffmpegs_filters_do(
     path = write_video(tmp_path / "turned.mp4", 2, Recipe(size_px=(130, 82), display=display))
     is_mirrored = display[0] * display[3] - display[1] * display[2] < 0
     with av.open(str(path)) as container, open_source(path) as source:
-        assert source.description["mirrored"] == is_mirrored
+        assert source.describe()["mirrored"] == is_mirrored
         assert any("mirrored" in warning for warning in source.warnings) == is_mirrored
         for stored, frame in zip(container.decode(video=0), source, strict=True):
             expected = filtered(stored, as_ffmpeg)
@@ -64,8 +64,8 @@ def test_pixels_that_are_not_square_are_stretched_and_named(
     path = write_video(tmp_path / f"wide.{suffix}", 3, Recipe(pixel_aspect=Fraction(*aspect)))
     with open_source(path) as source:
         assert source.size_px == size_px
-        assert source.description["stored_size_px"] == [96, 64]
-        assert source.description["pixel_aspect"] == f"{aspect[0]}/{aspect[1]}"
+        assert source.describe()["stored_size_px"] == [96, 64]
+        assert source.describe()["pixel_aspect"] == f"{aspect[0]}/{aspect[1]}"
         assert source.warnings == (
             f"{path.name}: its pixels are not square; 96x64 are stretched to {size_px[0]}x{size_px[1]}",
         )
@@ -77,7 +77,7 @@ def test_pixels_that_are_not_square_are_stretched_and_named(
 def test_pixels_of_no_format_are_refused(tmp_path: Path) -> None:
     path = write_video(tmp_path / "slit.mp4", 3, Recipe(pixel_aspect=Fraction(1, 90)))
     with pytest.raises(SourceError, match=r"pixels 1:90 wide in slit\.mp4"):
-        open_source(path)
+        open_source(path).describe()
 
 
 def write_two_films(path: Path, sizes: Sequence[tuple[int, int]], default: Collection[int]) -> Path:
@@ -118,8 +118,8 @@ def test_of_several_films_the_main_one_is_read_and_the_others_are_named(
     with open_source(path, start_s=0.2) as source:
         assert source.size_px == sizes[chosen]
         assert [index_in(frame.image) for frame in source] == [100 * chosen + index for index in range(2, 10)]
-        assert source.description["stream"] == chosen
-        assert [stream["size_px"] for stream in source.description["streams"]] == [list(size) for size in sizes]
+        assert source.describe()["stream"] == chosen
+        assert [stream["size_px"] for stream in source.describe()["streams"]] == [list(size) for size in sizes]
         assert "stream {} is read, not {} ({}x{})".format(chosen, 1 - chosen, *sizes[1 - chosen]) in source.warnings[0]
 
 
@@ -155,7 +155,7 @@ def test_a_time_that_is_repeated_or_microseconds_later_costs_one_frame_and_is_na
     path = rewrapped(plain_film, tmp_path / f"double.{suffix}", times_s)
     with open_source(path, start_s=start_s) as source:
         frames = list(source)
-        assert source.description["skipped_frames"] == 1
+        assert source.describe()["skipped_frames"] == 1
         assert any("1 frame is skipped" in warning and "at frame 13" in warning for warning in source.warnings)
     expected = [index for index in range(20) if index != 13 and index >= 10 * start_s]
     assert [frame.index for frame in frames] == [index_in(frame.image) for frame in frames] == expected
@@ -255,6 +255,6 @@ def test_an_avi_gives_its_times_whatever_the_order_and_the_ticks_a_frame(
     with open_source(path) as source:
         frames = list(source)
         assert source.frame_count == 25
-        assert source.description["skipped_frames"] == 0
+        assert source.describe()["skipped_frames"] == 0
     assert [index_in(frame.image) for frame in frames] == list(range(25))
     assert [frame.time_s for frame in frames] == pytest.approx([index / 25 for index in range(25)])

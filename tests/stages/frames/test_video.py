@@ -126,7 +126,7 @@ def test_rotation_metadata_turn_the_pictures_as_opencv_does(tmp_path: Path, rota
         assert frame.size_px == (expected.shape[1], expected.shape[0])
     with open_source(path) as source:
         assert source.size_px == ((130, 82) if abs(rotation_deg) == 180 else (82, 130))
-        assert abs(source.description["rotation_deg"]) == abs(rotation_deg)
+        assert abs(source.describe()["rotation_deg"]) == abs(rotation_deg)
 
 
 def test_frames_tell_when_they_were_captured_if_the_file_does(tmp_path: Path) -> None:
@@ -165,7 +165,7 @@ def test_the_surveyed_public_video_reads_as_opencv_reads_it(shared_data: Path) -
                 assert np.array_equal(frame.image, expected)
             assert frame.time_s == pytest.approx(frame.index / 10)
         assert frames == list(range(795))
-        assert source.description["corrupt_frames"] == 0
+        assert source.describe()["corrupt_frames"] == 0
     assert [frame.index for frame in read(path, start_s=38.8, stop_s=39.3, every=2)] == [388, 390, 392]
 
 
@@ -192,7 +192,7 @@ def test_files_that_are_no_videos_are_named_in_one_line(tmp_path: Path) -> None:
             open_source(address)
     for name, found in expected.items():
         with pytest.raises(SourceError, match=found) as caught:
-            open_source(tmp_path / name)
+            open_source(tmp_path / name).describe()
         assert "\n" not in str(caught.value)
         assert name in str(caught.value)
 
@@ -205,7 +205,7 @@ def test_the_address_of_a_file_is_that_file(tmp_path: Path) -> None:
         # As the command line gives it.
         open_source(Path(address)).close()
     with pytest.raises(SourceError, match=r"nothing at /.*missing\.mp4"):
-        open_source((tmp_path / "missing.mp4").as_uri())
+        open_source((tmp_path / "missing.mp4").as_uri()).describe()
 
 
 def test_a_sound_file_is_no_video(tmp_path: Path) -> None:
@@ -216,14 +216,14 @@ def test_a_sound_file_is_no_video(tmp_path: Path) -> None:
         frame.sample_rate = 8000
         container.mux(stream.encode(frame))
     with pytest.raises(SourceError, match=r"sound\.wav, which holds audio and no video"):
-        open_source(path)
+        open_source(path).describe()
 
 
 def test_an_mp4_without_its_table_of_frames_is_truncated(tmp_path: Path) -> None:
     path = write_video(tmp_path / "cut.mp4", 60)
     path.write_bytes(path.read_bytes()[:-1500])
     with pytest.raises(SourceTruncated, match="moov"):
-        open_source(path)
+        open_source(path).describe()
 
 
 @pytest.mark.parametrize("kept", [0.4, 0.7, 0.9])
@@ -249,7 +249,7 @@ def test_a_cut_file_read_to_a_stop_before_the_cut_is_whole(tmp_path: Path) -> No
     path.write_bytes(content[: int(len(content) * 0.8)])
     assert len(read(path, stop_s=2.0)) == 20
     with pytest.raises(SourceTruncated):
-        open_source(path, start_s=5.8)
+        open_source(path, start_s=5.8).describe()
 
 
 def test_a_hole_in_the_middle_is_bridged_and_counted(tmp_path: Path) -> None:
@@ -261,7 +261,7 @@ def test_a_hole_in_the_middle_is_bridged_and_counted(tmp_path: Path) -> None:
     path.write_bytes(content)
     with open_source(path) as source:
         frames = list(source)
-        assert source.description["corrupt_frames"] > 0
+        assert source.describe()["corrupt_frames"] > 0
     assert 30 < len(frames) <= 60
     assert frames[-1].time_s == pytest.approx(5.9)
 
@@ -273,13 +273,13 @@ def test_a_video_without_one_picture_that_can_be_decoded_is_none(tmp_path: Path)
     content[start:] = bytes(len(content) - start)
     path.write_bytes(content)
     with pytest.raises(SourceError, match="not one picture of which can be decoded"):
-        open_source(path)
+        open_source(path).describe()
 
 
 def test_a_crooked_rotation_is_refused(tmp_path: Path) -> None:
     path = write_video(tmp_path / "crooked.mp4", 2, Recipe(rotation_deg=45))
     with pytest.raises(SourceError, match=r"crooked\.mp4, turned by 45 degrees"):
-        open_source(path)
+        open_source(path).describe()
 
 
 def test_a_file_that_decodes_no_more_stops_and_says_so(tmp_path: Path) -> None:
@@ -319,7 +319,7 @@ def test_parts_that_no_source_has_are_refused(videos: dict[str, Path]) -> None:
         ({"fps": 0.0}, "more than 0 pictures a second"),
     ):
         with pytest.raises(SourceError, match=words):
-            open_source(path, **selection)
+            open_source(path, **selection).describe()
 
 
 def test_an_edit_list_that_drops_pictures_is_no_truncation(tmp_path: Path) -> None:

@@ -69,7 +69,7 @@ def test_a_camera_that_stands_still_keeps_its_map(seed: int) -> None:
     ground = soil(seed)
     maps, stage = watch(view(ground, shifted(0.0), k) for k in range(12))
     assert all(one is maps[0] for one in maps)
-    assert stage.description["warnings"] == []
+    assert stage.describe()["warnings"] == []
 
 
 @pytest.mark.parametrize(("pan_px", "turn_rad"), [(3.0, 0.0), (-2.0, 0.004), (0.0, -0.01)])
@@ -80,7 +80,7 @@ def test_a_slow_pan_carries_the_map_and_is_a_warning(pan_px: float, turn_rad: fl
     for found, pose in zip(maps, poses, strict=True):
         assert isinstance(found, GroundMap)
         assert misplaced_px(found, pose, first) < CARRIED_SURVEY_PX
-    assert any(MOVED in warning for warning in stage.description["warnings"])
+    assert any(MOVED in warning for warning in stage.describe()["warnings"])
 
 
 def test_once_much_has_left_the_picture_there_is_no_map() -> None:
@@ -104,7 +104,7 @@ def test_a_cut_ends_the_map_at_once_and_the_old_view_brings_it_back() -> None:
     assert all(isinstance(one, GroundMap) for one in maps[:5])
     assert all(isinstance(one, NoGroundMap) and one.reason == MOVED for one in maps[5:35])
     assert isinstance(maps[-1], GroundMap)
-    assert any(MOVED in warning for warning in stage.description["warnings"])
+    assert any(MOVED in warning for warning in stage.describe()["warnings"])
 
 
 def test_a_lorry_before_the_lens_hides_the_background_for_a_while() -> None:
@@ -122,7 +122,7 @@ def test_a_lorry_before_the_lens_hides_the_background_for_a_while() -> None:
 def test_where_nothing_can_be_seen_of_the_ground_the_map_holds_with_a_warning() -> None:
     maps, stage = watch([None] * 20)
     assert all(one is maps[0] for one in maps)
-    assert "too little to tell" in stage.description["warnings"][0]
+    assert "too little to tell" in stage.describe()["warnings"][0]
 
 
 def test_a_change_of_resolution_is_a_move() -> None:

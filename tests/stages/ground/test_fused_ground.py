@@ -226,9 +226,9 @@ def test_a_height_that_nobody_measured_is_learned_where_the_base_shows() -> None
 
 
 def test_the_record_of_a_run_says_what_the_ground_was_told() -> None:
-    described = _ground().description
+    described = _ground().describe()
     assert described["method"] == "fused" and described["camera"] == "camera file"
-    assert _ground(remember=False).description["method"] == "refined"
+    assert _ground(remember=False).describe()["method"] == "refined"
 
 
 def test_frames_taken_each_by_itself_need_no_motion() -> None:

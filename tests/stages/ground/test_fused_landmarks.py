@@ -80,7 +80,7 @@ def test_a_second_reference_never_makes_distances_less_sure(stated: bool) -> Non
         error, sigma = error_and_sigma(two, k)
         assert error < 3.0 * sigma
         assert sigma <= error_and_sigma(one, k)[1] * 1.02
-    assert not both.description["warnings"]
+    assert not both.describe()["warnings"]
 
 
 @pytest.mark.parametrize("stated", [pytest.param(False, marks=pytest.mark.live), True])
@@ -107,7 +107,7 @@ def test_a_reference_that_was_moved_is_named_and_the_ground_stays(which: int) ->
         error, sigma = error_and_sigma(result, k)
         assert error < 4.0 * sigma + 0.02
         assert seen(result).site_frame == before.site_frame
-    (warning,) = ground.description["warnings"]
+    (warning,) = ground.describe()["warnings"]
     assert f"reference {which + 1} was moved by 1.0 m" in warning
 
 
@@ -158,7 +158,7 @@ def test_a_marker_beside_a_reference_makes_it_surer() -> None:
         error, sigma = error_and_sigma(both.update(shown, boxes(k, second=False), motion(k)), k)
         assert error < 3.0 * sigma
     assert sigma < error_and_sigma(one, k)[1]
-    assert not both.description["warnings"]
+    assert not both.describe()["warnings"]
 
 
 def test_a_marker_that_was_moved_is_named_and_changes_nothing() -> None:
@@ -168,7 +168,7 @@ def test_a_marker_that_was_moved_is_named_and_changes_nothing() -> None:
         shown = with_marker(k, MARKER if k < 3 else astray)
         error, sigma = error_and_sigma(ground.update(frame(shown, k / FPS), boxes(k, second=False), motion(k)), k)
         assert error < 3.0 * sigma
-    (warning,) = ground.description["warnings"]
+    (warning,) = ground.describe()["warnings"]
     assert "marker 7 lies elsewhere than stated" in warning and "frame" in warning
 
 
@@ -185,7 +185,7 @@ def test_markers_that_were_moved_are_named_once_whichever_are_in_sight() -> None
             draw_marker(light, marker_pattern("apriltag36h11", place.marker_id), view(k).project(place.corners_m))
         shown = np.asarray(np.clip(np.rint(light * 255.0), 0, 255), dtype=np.uint8)
         ground.update(frame(shown, k / FPS), boxes(k, second=False), motion(k))
-    (warning,) = ground.description["warnings"]
+    (warning,) = ground.describe()["warnings"]
     assert "marker 7 lies elsewhere than stated" in warning
 
 
@@ -206,7 +206,7 @@ def test_telemetry_beside_a_reference_makes_it_surer_never_less_sure(angles: boo
     error, sigma = error_and_sigma(with_it.update(replace(shown, telemetry=said), boxes(0, second=False), STILL), 0)
     assert error < 3.0 * sigma
     assert sigma <= error_and_sigma(without.update(shown, boxes(0, second=False), STILL), 0)[1] * 1.002
-    assert not with_it.description["warnings"]
+    assert not with_it.describe()["warnings"]
 
 
 @pytest.mark.parametrize("said", [telemetry(60.0), telemetry(9.5, 20.0)], ids=["height", "pitch"])
@@ -216,12 +216,12 @@ def test_a_reference_that_telemetry_contradicts_is_believed_after_a_while_and_na
     for time_s in (0.0, 0.5, 1.9):
         shown = replace(frame(picture(0, second=False), time_s), telemetry=said)
         with_it.update(shown, boxes(0, second=False), STILL)
-        assert not with_it.description["warnings"] or "found in no frame" in with_it.description["warnings"][0]
+        assert not with_it.describe()["warnings"] or "found in no frame" in with_it.describe()["warnings"][0]
     shown = frame(picture(0, second=False), 2.2)
     one = seen(with_it.update(replace(shown, telemetry=said), boxes(0, second=False), STILL))
     other = seen(without.update(shown, boxes(0, second=False), STILL))
     np.testing.assert_allclose(one.image_to_ground, other.image_to_ground, rtol=1e-9, atol=1e-12)
-    (warning,) = with_it.description["warnings"]
+    (warning,) = with_it.describe()["warnings"]
     assert "telemetry" in warning and "the reference is trusted" in warning
 
 
@@ -240,7 +240,7 @@ def test_a_lens_that_cannot_be_is_named_and_not_used(factor: float) -> None:
     stated = CameraPrior.calibrated(CAMERA.refocused(factor, float(CAMERA.distortion[0])))
     ground = following(references()[0], camera=stated)
     result = ground.update(frame(picture(0, second=False), 0.0), boxes(0, second=False), STILL)
-    warnings = ground.description["warnings"]
+    warnings = ground.describe()["warnings"]
     if 0.9 < factor < 1.1:
         assert not warnings
     else:
@@ -256,6 +256,6 @@ def test_a_reference_that_no_frame_shows_is_named_with_the_reason_until_one_does
     bare = frame(picture(0, first=False, second=False), 0.0)
     result = ground.update(bare, boxes(0, second=False), STILL)
     assert isinstance(result, NoGroundMap)
-    assert ground.description["warnings"] == [f"the reference was found in no frame: {NOT_THERE}"]
+    assert ground.describe()["warnings"] == [f"the reference was found in no frame: {NOT_THERE}"]
     ground.update(frame(picture(1, second=False), 1.0), boxes(1, second=False), STILL)
-    assert not ground.description["warnings"]
+    assert not ground.describe()["warnings"]

@@ -241,15 +241,15 @@ def test_a_few_people_need_the_drone_s_height_beside_them() -> None:
 
 def test_what_the_metres_rest_on_is_said_once_it_is_known() -> None:
     ground = by_marker()
-    assert ground.description["basis"].endswith("not seen yet")
-    assert "first frame" in FusedGround().description["basis"]
+    assert ground.describe()["basis"].endswith("not seen yet")
+    assert "first frame" in FusedGround().describe()["basis"]
     ground.update(frame(pictured(looking())), NOTHING, unmoved())
-    assert ground.description["basis"].startswith(
+    assert ground.describe()["basis"].startswith(
         "a printed marker of 1.2 m, its camera's lens from a camera file: expect"
     )
     nothing = FusedGround(params=FusedParams(telemetry=False, sizes=False))
     assert "would help" in reason(nothing.update(frame(BARE), NOTHING, STILL))
-    assert nothing.description["basis"].startswith("nothing")
+    assert nothing.describe()["basis"].startswith("nothing")
 
 
 @pytest.mark.parametrize("missing", ["pitch_deg", "height_m"])

@@ -63,7 +63,7 @@ def test_points_of_the_first_picture_are_carried_by_the_motion() -> None:
         error, sigma = error_and_sigma(result, k)
         assert error < 3.0 * sigma < 0.5
         assert place_error_m(result, k) < 0.2
-    assert "5 surveyed points" in ground.description["basis"]
+    assert "5 surveyed points" in ground.describe()["basis"]
 
 
 def test_points_of_a_later_picture_wait_for_it() -> None:
@@ -81,7 +81,7 @@ def test_a_picture_that_never_comes_is_a_warning() -> None:
     for k in range(3):
         result = ground.update(frame(picture(k), k / FPS), Detections.empty(), motion(k))
     assert isinstance(result, NoGroundMap) and MISSED in result.reason
-    assert any(MISSED in warning for warning in ground.description["warnings"])
+    assert any(MISSED in warning for warning in ground.describe()["warnings"])
 
 
 @pytest.mark.parametrize("place_known", [False, True])
@@ -97,7 +97,7 @@ def test_a_survey_and_a_reference_are_surer_together(place_known: bool) -> None:
         assert error < 3.0 * sigma
         assert sigma <= error_and_sigma(one, k)[1] * 1.02
         assert place_error_m(two, k) < 0.25
-    assert not both.description["warnings"]
+    assert not both.describe()["warnings"]
 
 
 def test_a_survey_takes_over_the_frame_of_a_reference_without_a_place() -> None:
@@ -121,7 +121,7 @@ def test_a_survey_that_contradicts_the_reference_is_named_and_changes_nothing() 
         shown = frame(picture(k), k / FPS)
         one, other = (ground.update(shown, boxes(k), motion(k)) for ground in (with_it, without))
         np.testing.assert_array_equal(seen(one).image_to_ground, seen(other).image_to_ground)
-    (warning,) = with_it.description["warnings"]
+    (warning,) = with_it.describe()["warnings"]
     assert "the surveyed points lie elsewhere than stated" in warning and "the reference is trusted" in warning
 
 

@@ -344,7 +344,7 @@ def test_the_description_is_plain_and_says_what_was_configured() -> None:
     stage = ReferenceGround(
         FOOTING, ReferenceParams(method="paper"), place=GivenPlace(box_xyxy_px=(1, 2, 30, 40), first_corner_px=(2, 3))
     )
-    record = json.loads(json.dumps(stage.description))
+    record = json.loads(json.dumps(stage.describe()))
     assert record["params"]["method"] == "paper"
     assert record["box_xyxy_px"] == [1, 2, 30, 40]
-    assert ReferenceGround(FOOTING).description["box_xyxy_px"] is None
+    assert ReferenceGround(FOOTING).describe()["box_xyxy_px"] is None

@@ -31,8 +31,7 @@ class Mapped(protocols.Ground):
         image_to_ground = np.diag([factor, factor, 1.0]) @ homography.invert(_CROWD.view.plane_to_pinhole())
         self.map = GroundMap(image_to_ground, np.zeros((9, 9)), (1280, 720), "test", 1.0, camera=_CAMERA)
 
-    @property
-    def description(self) -> dict[str, object]:
+    def describe(self) -> dict[str, object]:
         return {"method": "test", "warnings": ["its own"]}
 
     def update(self, frame: Frame, detections: Detections, motion: AnyMotion) -> AnyGround:
@@ -54,8 +53,8 @@ def watched(factor: float, seen: Detections, frames: int = 4, step_s: float = 0.
 def test_metres_that_are_metres_pass_untouched() -> None:
     watch, result = watched(1.0, workers(_BOXES))
     assert result is watch.inner.update(Frame("drawn", 0, 0.0, _PICTURE), workers(_BOXES), NoCameraMotion(""))
-    assert watch.description["warnings"] == ["its own"]
-    assert watch.description["scale_watch"]["sizes_seen"]["people"] > 8
+    assert watch.describe()["warnings"] == ["its own"]
+    assert watch.describe()["scale_watch"]["sizes_seen"]["people"] > 8
 
 
 @settings(max_examples=6, deadline=None)
@@ -63,7 +62,7 @@ def test_metres_that_are_metres_pass_untouched() -> None:
 def test_a_factor_of_some_units_is_a_warning_by_name(factor: float, off: float) -> None:
     watch, result = watched(factor * off, workers(_BOXES))
     assert isinstance(result, GroundMap)
-    _, told = watch.description["warnings"]
+    _, told = watch.describe()["warnings"]
     assert told.startswith("seen through the ground map, people look")
     unit = {3.281: "feet for metres", 0.3048: "metres for feet"}.get(factor, "check the lengths")
     assert unit in told
@@ -77,7 +76,7 @@ def test_a_factor_that_cannot_be_is_no_map_and_named(factor: float, unit: str) -
     watch, result = watched(factor, workers(_BOXES))
     assert isinstance(result, NoGroundMap)
     assert unit in result.reason
-    assert unit in watch.description["warnings"][1]
+    assert unit in watch.describe()["warnings"][1]
 
 
 def test_the_reason_keeps_its_words_so_that_it_can_be_counted() -> None:
@@ -121,9 +120,9 @@ def test_small_machines_do_not_hide_what_people_say(factor: float) -> None:
     """A site's excavators may be two thirds as large as is usual."""
     watch, result = watched(factor, _both(_machines(0.65)))
     assert isinstance(result, GroundMap)
-    assert any("seen through the ground map, people" in told for told in watch.description["warnings"])
+    assert any("seen through the ground map, people" in told for told in watch.describe()["warnings"])
     silent, _ = watched(1.0, _both(_machines(0.65)))
-    assert silent.description["warnings"] == ["its own"]
+    assert silent.describe()["warnings"] == ["its own"]
 
 
 def test_people_and_machines_together_take_the_map_away_at_the_first_look() -> None:
@@ -138,7 +137,7 @@ def test_mirrored_metres_are_as_long(factor: float) -> None:
     watch = ScaleWatch(mapped)
     for k in range(4):
         watch.update(Frame("drawn", k, 0.5 * k, _PICTURE), workers(_BOXES), NoCameraMotion("none"))
-    assert ("feet" in " ".join(watch.description["warnings"])) == (factor > 1.0)
+    assert ("feet" in " ".join(watch.describe()["warnings"])) == (factor > 1.0)
 
 
 def test_a_map_that_no_camera_has_is_said() -> None:
@@ -146,14 +145,14 @@ def test_a_map_that_no_camera_has_is_said() -> None:
     mapped.map = replace(mapped.map, image_to_ground=np.diag([1.0, 0.0, 1.0]))
     watch = ScaleWatch(mapped)
     watch.update(Frame("drawn", 0, 0.0, _PICTURE), workers(_BOXES), NoCameraMotion("none"))
-    assert any("no camera above level ground" in told for told in watch.description["warnings"])
+    assert any("no camera above level ground" in told for told in watch.describe()["warnings"])
 
 
 def test_it_looks_at_most_twice_a_second() -> None:
     watch, _ = watched(1.0, workers(_BOXES), frames=31, step_s=0.1)
     one, _ = watched(1.0, workers(_BOXES), frames=1)
-    seen = watch.description["scale_watch"]["sizes_seen"]["people"]
-    assert seen <= 7 * one.description["scale_watch"]["sizes_seen"]["people"]
+    seen = watch.describe()["scale_watch"]["sizes_seen"]["people"]
+    assert seen <= 7 * one.describe()["scale_watch"]["sizes_seen"]["people"]
 
 
 @settings(max_examples=5, deadline=None)
@@ -204,17 +203,17 @@ def test_a_survey_in_another_unit_is_named(shared_data: Path, name: str, told: s
         result = watch.update(Frame("drawn", k, 0.5 * k, _PICTURE), seen, NoCameraMotion(""))
     if told is None:
         assert isinstance(result, GroundMap)
-        assert watch.description["warnings"] == []
+        assert watch.describe()["warnings"] == []
     else:
         assert isinstance(result, NoGroundMap)
         assert told in result.reason
-        assert told in watch.description["warnings"][-1]
+        assert told in watch.describe()["warnings"][-1]
 
 
 def test_what_a_detector_is_not_sure_of_says_nothing() -> None:
     watch, result = watched(100.0, workers(_BOXES, 0.5))
     assert isinstance(result, GroundMap)
-    assert watch.description["scale_watch"]["sizes_seen"] == {}
+    assert watch.describe()["scale_watch"]["sizes_seen"] == {}
 
 
 def test_no_map_stays_no_map_with_its_own_reason() -> None:

@@ -38,7 +38,7 @@ def test_a_survey_file_gives_the_map_of_its_points(tmp_path: Path) -> None:
     ground = load_survey(survey_file(tmp_path, _SURVEY))
     mapped, _ = updated(ground).to_ground(np.array([[300.0, 250.0]]))
     np.testing.assert_allclose(mapped, [[2.0, 1.5]], atol=1e-9)
-    assert [row["name"] for row in ground.description["points"]] == ["kerb", "manhole", "point 3", "point 4"]
+    assert [row["name"] for row in ground.describe()["points"]] == ["kerb", "manhole", "point 3", "point 4"]
 
 
 def test_a_survey_files_camera_is_found_beside_it_and_can_be_replaced(tmp_path: Path) -> None:

@@ -86,15 +86,15 @@ def test_exact_points_give_the_exact_map(count: int, camera: Camera) -> None:
     mapped, valid = updated(ground).to_ground(seen(elsewhere_m, camera))
     assert valid.all()
     np.testing.assert_allclose(mapped, elsewhere_m, atol=10 * GROUND_THROUGH_LENS_M)
-    assert ground.description["rms_m"] < GROUND_THROUGH_LENS_M
-    assert ground.description["warnings"] == []
+    assert ground.describe()["rms_m"] < GROUND_THROUGH_LENS_M
+    assert ground.describe()["warnings"] == []
 
 
 def test_forgetting_the_lens_shows_in_the_residuals() -> None:
     with_lens = SurveyedGround(seen(_POINTS_M, LENS), _POINTS_M, _SIZE, camera=LENS)
     without = SurveyedGround(seen(_POINTS_M, LENS), _POINTS_M, _SIZE)
-    assert without.description["rms_px"] > 100 * with_lens.description["rms_px"]
-    assert without.description["lens_distortion_removed"] is False
+    assert without.describe()["rms_px"] > 100 * with_lens.describe()["rms_px"]
+    assert without.describe()["lens_distortion_removed"] is False
 
 
 def test_the_fit_has_the_least_reprojection_error() -> None:
@@ -121,10 +121,10 @@ def test_the_residuals_are_those_of_the_map() -> None:
     current = updated(ground)
     np.testing.assert_allclose(ground.fit.residuals_m, current.to_ground(noisy_px)[0] - _POINTS_M, atol=1e-9)
     np.testing.assert_allclose(ground.fit.residuals_px, noisy_px - current.to_image(_POINTS_M)[0], atol=1e-6)
-    rows = ground.description["points"]
+    rows = ground.describe()["points"]
     assert [row["residual_px"] for row in rows] == pytest.approx(np.linalg.norm(ground.fit.residuals_px, axis=1))
-    assert ground.description["rms_m"] == pytest.approx(np.sqrt((ground.fit.residuals_m**2).sum(axis=1).mean()))
-    assert json.loads(json.dumps(ground.description)) == ground.description
+    assert ground.describe()["rms_m"] == pytest.approx(np.sqrt((ground.fit.residuals_m**2).sum(axis=1).mean()))
+    assert json.loads(json.dumps(ground.describe())) == ground.describe()
 
 
 def distance_and_sigma(current: GroundMap, pair_px: FloatArray) -> tuple[float, float]:
@@ -182,13 +182,13 @@ def test_the_worst_point_is_named(wrong: int) -> None:
     moved_px = seen(_POINTS_M, _PLAIN_LENS)
     moved_px[wrong] += np.array([40.0, -30.0]) * (1 if moved_px[wrong, 0] < 600 else -1)
     ground = SurveyedGround(moved_px, _POINTS_M, _SIZE, names=tuple("abcdefgh"))
-    (warning,) = ground.description["warnings"]
+    (warning,) = ground.describe()["warnings"]
     assert warning.endswith(f"most likely wrong: {'abcdefgh'[wrong]!r}")
 
 
 def test_mirrored_metres_get_a_warning() -> None:
     ground = SurveyedGround(seen(_POINTS_M, _PLAIN_LENS), _POINTS_M * [1, -1], _SIZE)
-    assert "mirrored" in ground.description["warnings"][0]
+    assert "mirrored" in ground.describe()["warnings"][0]
 
 
 def test_the_scale_is_metres_per_pixel_at_the_middle_of_the_points() -> None:

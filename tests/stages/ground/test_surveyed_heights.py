@@ -163,7 +163,7 @@ def test_one_wrong_height_is_named_and_left_out(seed: int) -> None:
     assert survey.plane is not None
     assert survey.plane.doubtful == (f"point {seed + 1}",)
     assert np.linalg.norm(survey.plane.rise - site.rise) < 0.05
-    assert any(f"'point {seed + 1}'" in warning for warning in survey.description["warnings"])
+    assert any(f"'point {seed + 1}'" in warning for warning in survey.describe()["warnings"])
 
 
 def test_heights_of_some_points_are_enough() -> None:
@@ -198,7 +198,7 @@ def test_a_file_tells_heights(tmp_path: Path) -> None:
     path.write_text("image_size_px: [1280, 720]\npoints:\n" + "\n".join(rows), encoding="utf-8")
     survey = load_survey(path)
     assert survey.plane is not None and abs(survey.plane.slope_deg - 10.0) < 1e-6
-    assert "slopes by 10.0 degrees" in survey.description["basis"]
+    assert "slopes by 10.0 degrees" in survey.describe()["basis"]
     path.write_text(path.read_text(encoding="utf-8").replace("z_m: 1", "z_m: high1", 1), encoding="utf-8")
     with pytest.raises(GroundError, match="z_m of 'point 1'"):
         load_survey(path)
@@ -254,7 +254,7 @@ def test_a_marker_that_lies_on_the_slope_agrees_with_the_survey(seed: int) -> No
         camera=CameraPrior.calibrated(camera), params=FusedParams(sizes=False),
     )  # fmt: skip
     result = ground.update(frame(picture), Detections.empty(), STILL)
-    assert isinstance(result, GroundMap) and not ground.description["warnings"]
+    assert isinstance(result, GroundMap) and not ground.describe()["warnings"]
     assert worst_m(result, site, places_m(seed + 50, 8, half_m=4.0)) < 0.05
     alone = carried(surveyed(site, xy_m, camera=camera), camera)
     assert np.trace(_middle_covariance(result)) < np.trace(_middle_covariance(alone))

@@ -28,24 +28,24 @@ def after(hours: float, events: list[Hazard], *, people: int = 2) -> AlarmLoad:
 
 
 def test_hours_are_those_of_all_workers_who_are_placed() -> None:
-    assert after(0.5, [], people=4).description == {"worker_hours": 2.0, "alarms": 0, "per_worker_hour": 0.0}
+    assert after(0.5, [], people=4).describe() == {"worker_hours": 2.0, "alarms": 0, "per_worker_hour": 0.0}
 
 
 def test_alarms_are_counted_once_and_what_is_unknown_is_none() -> None:
     events = [said(1), said(1, severity="danger"), said(2), said(3, severity="unknown"), said(4, rule="measurement")]
-    assert after(0.5, events).description == {"worker_hours": 1.0, "alarms": 2, "per_worker_hour": 2.0}
+    assert after(0.5, events).describe() == {"worker_hours": 1.0, "alarms": 2, "per_worker_hour": 2.0}
 
 
 def test_of_a_few_minutes_no_rate_is_told() -> None:
     load = after(0.1, [said(k) for k in range(50)])
-    assert load.description["per_worker_hour"] is None and not load.warnings
+    assert load.describe()["per_worker_hour"] is None and not load.warnings
 
 
 def test_a_pause_in_the_stream_is_no_work() -> None:
     load, positions = AlarmLoad(), workers(2)
     for time_s in (0.0, 1.0, 3601.0, 3602.0):
         load.update(time_s, positions, [])
-    assert load.description["worker_hours"] == pytest.approx(2 * 7.0 / 3600.0)
+    assert load.describe()["worker_hours"] == pytest.approx(2 * 7.0 / 3600.0)
 
 
 def test_too_many_are_named_with_the_setting_that_leaves_few_enough() -> None:

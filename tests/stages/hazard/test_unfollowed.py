@@ -28,13 +28,13 @@ def test_many_sure_detections_in_no_track_are_one_measurement_hazard_at_any_rate
             ("measurement", "unknown", "closed"),
         ]
         assert events[0].time_s == 0.0
-        assert "200 of 200" in monitor.description["warnings"][0]
+        assert "200 of 200" in monitor.describe()["warnings"][0]
 
 
 def test_a_few_are_none() -> None:
     events, monitor = events_of([0.2] * 50, 0.2)
     assert events == []
-    assert monitor.description["warnings"] == []
+    assert monitor.describe()["warnings"] == []
 
 
 def test_it_ends_once_tracks_show_again_what_is_seen() -> None:
@@ -44,4 +44,4 @@ def test_it_ends_once_tracks_show_again_what_is_seen() -> None:
         "sure detections are in tracks again",
     ]
     # The run says so all the same.
-    assert len(monitor.description["warnings"]) == 1
+    assert len(monitor.describe()["warnings"]) == 1

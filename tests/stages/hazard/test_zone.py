@@ -229,7 +229,7 @@ def test_where_nobody_stated_the_site_frame_all_zones_are_unknown_and_one_hazard
         events += monitor.update(STEP_S * index, rows, Proximities.empty(), ground, FOLLOWED)
     mine = [event for event in events[1:] if event.track_ids == (1,)]
     assert [event.phase for event in mine] == ["opened", "unknown", "updated"]
-    assert monitor.description["warnings"] == [
+    assert monitor.describe()["warnings"] == [
         "zones were not watched in 10 of 20 frames with a ground map: nobody stated where the site frame lies; "
         "a survey, a marker, or a reference with first_corner_px would tell"
     ]

@@ -17,7 +17,7 @@ def told(frames: list[Frame]) -> list[str]:
     estimator = MotionEstimator()
     for one in frames:
         estimator.update(one, NOTHING)
-    warnings: list[str] = estimator.description["warnings"]
+    warnings: list[str] = estimator.describe()["warnings"]
     return warnings
 
 

@@ -214,9 +214,9 @@ def test_what_would_make_ground_watched_is_said_of_what_was_measured() -> None:
         watcher = GroundWatcher(finding=finding)
         for time_s in (0.0, 1.0):
             watcher.update(frame(site_picture(0), time_s), ground_map(altitude_m), *nobody())
-        said = list(watcher.description["warnings"])
+        said = list(watcher.describe()["warnings"])
         assert len(said) == (words is not None) and all(re.search(str(words), one) for one in said)
         # A stream that had no map for most of the time has another trouble.
         for time_s in range(2, 9):
             watcher.update(frame(site_picture(0), float(time_s)), NoGroundMap("not found"), *nobody())
-        assert [one for one in watcher.description["warnings"] if "most ground" in one] == []
+        assert [one for one in watcher.describe()["warnings"] if "most ground" in one] == []

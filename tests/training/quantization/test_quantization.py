@@ -366,6 +366,6 @@ def test_what_was_measured_of_workers_stands_in_the_file_and_goes_along(tmp_path
     tell_finding(model, finding)
     assert read_own_model(model)[1] == replace(before, finds_workers={"height_px": (10.0, 20.0), "share": (0.5, 0.9)})
     store_half(model, tmp_path / "half.onnx")
-    assert WorkerFinding.of_detector(OnnxDetector(tmp_path / "half.onnx").description).share == (0.5, 0.9)
+    assert WorkerFinding.of_detector(OnnxDetector(tmp_path / "half.onnx").describe()).share == (0.5, 0.9)
     with pytest.raises(DataError, match="20 workers"):
         tell_finding(model, WorkerFinding())

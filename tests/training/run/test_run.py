@@ -385,7 +385,7 @@ def test_a_run_that_goes_on_from_weights_says_what_it_gained_and_lost(
         assert compared[when]["mean_ap11"] == validate(network, pictures, CLASSES, bf16=False).mean_ap11
     assert "blocks (val)" in (out / "model-card.md").read_text()
     assert any("before" in line and "after" in line for line in heard.messages)
-    assert OnnxDetector(out / "model.onnx").description["input_size_px"] == [128, 96]
+    assert OnnxDetector(out / "model.onnx").describe()["input_size_px"] == [128, 96]
 
 
 def test_a_run_from_nothing_has_no_before(finished: tuple[RunPlan, Path, _Heard]) -> None:

@@ -183,7 +183,7 @@ def try_candidate(
     found = [grouping.found(detections) for detections in seen]
     truth = [grouping.truth(picture) for picture in material.truth]
     score = score_detections(truth, found, grouping.classes, iou)
-    description = detector.description
+    description = detector.describe()
     return TrialResult(
         candidate=candidate,
         model=description,

@@ -107,7 +107,7 @@ def build_monitor(clip: Clip, setup: MonitorSetup, source: FileSource) -> Monito
         detector, tracker = build_stage("detect", settings), build_stage("track", settings)
         _check_reference_class(detector, setup.detector)
         if isinstance(detector, RecordedDetector):
-            detector.check_source(source.description)
+            detector.check_source(source.describe())
     else:
         detector = tracker = TrueBoxes(clip, setup.box_error if setup.detector == "noisy" else None, setup.seed)
     ground = build_stage("ground", settings, source.camera_prior)
@@ -164,7 +164,7 @@ def _first_corner_px(clip: Clip, reference: TrueReference) -> list[float] | None
 
 
 def _check_reference_class(detector: Detector, model: Path) -> None:
-    class_map = detector.description.get("class_map")
+    class_map = detector.describe().get("class_map")
     # A detector of somebody's own, replayed, may not say what it knows.
     if class_map is not None and "reference" not in class_map.values():
         raise DataError(

@@ -21,6 +21,7 @@ from standoff.evaluation.paper.pair_alarms import PairAlarms
 from standoff.evaluation.paper.snapshots import Snapshots
 from standoff.evaluation.paper.truth_detector import without_reference
 from standoff.evaluation.rectification import FAILURE_PX
+from standoff.evaluation.run_frames import RunFrame
 from standoff.monitor import Run
 from standoff.stages.frames import FileSource, open_source
 from standoff.stages.ground import ReferenceShape
@@ -54,8 +55,8 @@ class MonitoredClip:
         carried: (F,) whether the map comes from earlier frames while a corner of the reference is outside the picture.
         scale_m_per_px: (F,) of the map (Eq. 6); NaN without.
         corner_error_px: (F, 4) of the reference's corners; NaN without a map, or where the map tells no corners.
-        ground_s: (F,) seconds spent on finding the map.
-        snapshots: Pictures of some frames.
+        ground_s: (F,) seconds spent on finding the map; NaN where nobody timed it.
+        snapshots: Pictures of some frames, where there are any.
     """
 
     size_px: tuple[int, int]
@@ -116,6 +117,7 @@ def monitor_clip(clip: Clip, setup: MonitorSetup, on_frame: Callable[[], None] |
         DataError: There is no reference object, or the video and the truth have different lengths.
         StandoffError: The video or the model cannot be used.
     """
+    assert clip.reference is not None, "only such clips are watched"
     with open_clip_video(clip) as source:
         monitor = build_monitor(clip, setup, source)
         reference = settings_for(clip, setup).ground.reference
@@ -124,7 +126,8 @@ def monitor_clip(clip: Clip, setup: MonitorSetup, on_frame: Callable[[], None] |
         with closing(iter(Run(source, monitor))) as results:
             for result in results:
                 check_frame(clip, result.frame.index)
-                notes.take(result)
+                notes.take(RunFrame.of_result(result))
+                _keep_picture(notes.monitored, result, clip.reference.corners_px[result.frame.index])
                 if on_frame is not None:
                     on_frame()
     check_frame(clip, clip.frame_count - 1, seen=notes.taken)
@@ -161,8 +164,21 @@ def _length_error(clip: Clip, found: str) -> DataError:
     )
 
 
+def _keep_picture(monitored: MonitoredClip, result: FrameResult, true_px: FloatArray) -> None:
+    """Offer a frame that was filed for the report."""
+    frame, ground, snapshots = result.frame.index, result.ground, monitored.snapshots
+    if isinstance(ground, NoGroundMap) or monitored.no_map[frame]:
+        snapshots.take_failure(result.frame, true_px, None, str(monitored.no_map[frame]))
+    elif monitored.carried[frame]:
+        return
+    elif is_wrong(monitored.corner_error_px[frame]):
+        snapshots.take_failure(result.frame, true_px, ground, WRONG)
+    else:
+        snapshots.take(result.frame, true_px, ground)
+
+
 class Notes:
-    """Takes each frame's result and files it under what is really there.
+    """Takes what a run said of each frame and files it under what is really there.
 
     Args:
         clip: With a reference object.
@@ -183,23 +199,23 @@ class Notes:
         self._true_ids = true_ids
         self._said = PairAlarms(clip.pairs)
 
-    def take(self, result: FrameResult) -> IntArray:
+    def take(self, said: RunFrame) -> IntArray:
         """File a frame.
 
         Returns:
-            (E,) row of each entity's track among the result's tracks, or NOTHING.
+            (E,) row of each entity's track among the frame's tracks, or NOTHING.
         """
-        frame, monitored = result.frame.index, self.monitored
+        frame, monitored = said.index, self.monitored
         self.taken += 1
-        monitored.time_s[frame] = result.frame.time_s
-        monitored.ground_s[frame] = result.stage_ms["ground"] / 1e3
-        turn = self._take_map(result)
-        tracks, detections = result.tracks, without_reference(result.detections)
+        monitored.time_s[frame] = said.time_s
+        monitored.ground_s[frame] = said.ground_s
+        turn = self._take_map(said)
+        detections = without_reference(said.detections)
         if self._true_ids:
-            track_row = detection_row = self._rows_by_id(tracks.track_id)
+            track_row = detection_row = self._rows_by_id(said.track_id)
         else:
             true_px, true_class = self._clip.box_px[frame], self._clip.class_id
-            track_row = match_boxes(true_px, true_class, tracks.xyxy_px, tracks.class_id)
+            track_row = match_boxes(true_px, true_class, said.track_px, said.track_class_id)
             detection_row = match_boxes(true_px, true_class, detections.xyxy_px, detections.class_id)
         detected, tracked = detection_row != NOTHING, track_row != NOTHING
         monitored.detected_px[frame, detected] = detections.xyxy_px[detection_row[detected]]
@@ -207,25 +223,22 @@ class Notes:
             # Distances count, places are counted from somewhere else.
             monitored.reason[frame, tracked] = NOT_BY_REFERENCE
         else:
-            xy_m = self._turning.to_site(result.positions.xy_m[track_row[tracked]], turn)
+            xy_m = self._turning.to_site(said.xy_m[track_row[tracked]], turn)
             monitored.xy_m[frame, tracked] = xy_m
-            monitored.reason[frame, tracked] = result.positions.reason[track_row[tracked]]
+            monitored.reason[frame, tracked] = said.reason[track_row[tracked]]
         monitored.reason[frame, ~tracked] = NOT_DETECTED
         monitored.reason[frame, np.isnan(self._clip.box_px[frame]).any(axis=1)] = NOT_VISIBLE
-        self._take_distances(result, track_row)
-        entity_of = dict(
-            zip(tracks.track_id[track_row[tracked]].tolist(), np.flatnonzero(tracked).tolist(), strict=True)
-        )
-        monitored.said[frame], monitored.alarmed[frame] = self._said.take(result.hazards, entity_of)
+        self._take_distances(said, track_row)
+        entity_of = dict(zip(said.track_id[track_row[tracked]].tolist(), np.flatnonzero(tracked).tolist(), strict=True))
+        monitored.said[frame], monitored.alarmed[frame] = self._said.take(said.hazards, entity_of)
         return track_row
 
-    def _take_map(self, result: FrameResult) -> int:
+    def _take_map(self, said: RunFrame) -> int:
         """File what is known of the map; return the turn that brings its positions to the site frame."""
-        frame, ground, monitored = result.frame.index, result.ground, self.monitored
+        frame, ground, monitored = said.index, said.ground, self.monitored
         true_px = self._true_px[frame]
         if isinstance(ground, NoGroundMap) or ground.method == _ELSEWHERE:
             monitored.no_map[frame] = NOT_BY_REFERENCE if isinstance(ground, GroundMap) else ground.reason
-            monitored.snapshots.take_failure(result.frame, true_px, None, str(monitored.no_map[frame]))
             return 0
         error_px, turn = np.full(4, np.nan), self._turn
         if len(ground.anchors_px) == len(true_px) and np.isfinite(true_px).all():
@@ -240,23 +253,16 @@ class Notes:
         visible = np.isfinite(boxes_px).all(axis=1)
         for points, points_px in ((monitored.true_feet, self._clip.foot_px), (monitored.level_feet, self._level_px)):
             points.take(frame, np.where(visible[:, None], points_px[frame], np.nan), ground, self._turning, turn)
-        if monitored.carried[frame]:
-            return turn
-        if is_wrong(error_px):
-            monitored.snapshots.take_failure(result.frame, true_px, ground, WRONG)
-        else:
-            monitored.snapshots.take(result.frame, true_px, ground)
         return turn
 
-    def _take_distances(self, result: FrameResult, track_row: IntArray) -> None:
-        near = result.proximities
-        rows = {pair: k for k, pair in enumerate(zip(near.track_a.tolist(), near.track_b.tolist(), strict=True))}
+    def _take_distances(self, said: RunFrame, track_row: IntArray) -> None:
+        rows = {(first, second): k for k, (first, second) in enumerate(said.pair_ids.tolist())}
         for column, ends in enumerate(self._clip.pairs):
             if (track_row[ends] != NOTHING).all():
-                first, second = sorted(result.tracks.track_id[track_row[ends]].tolist())
+                first, second = sorted(said.track_id[track_row[ends]].tolist())
                 if (row := rows.get((first, second))) is not None:
-                    self.monitored.distance_m[result.frame.index, column] = near.distance_m[row]
-                    self.monitored.sigma_m[result.frame.index, column] = near.sigma_m[row]
+                    self.monitored.distance_m[said.index, column] = said.distance_m[row]
+                    self.monitored.sigma_m[said.index, column] = said.sigma_m[row]
 
     def _rows_by_id(self, track_id: IntArray) -> IntArray:
         """Return (E,) the row of each entity under its own id, or -1."""

@@ -55,9 +55,8 @@ class TrueBoxes(protocols.Detector, protocols.Tracker):
         self._shown = np.zeros(len(clip.entity_id), dtype=np.bool_)
         self._first_s: dict[int, float] = {}
 
-    @property
-    def description(self) -> dict[str, Any]:
-        """What this is, for the record."""
+    def describe(self) -> dict[str, Any]:
+        """Return what this is, for the record."""
         return {"kind": "true boxes", "reference_margin_px": REFERENCE_MARGIN_PX}
 
     def detect(self, frame: Frame) -> Detections:

@@ -79,9 +79,8 @@ class OnnxDetector(protocols.Detector):
             thresholds[CLASS_BY_NAME[name].id] = threshold
         return thresholds
 
-    @property
-    def description(self) -> dict[str, Any]:
-        """Facts for the record: the model, its labels and what became of them, and what computes."""
+    def describe(self) -> dict[str, Any]:
+        """Return facts for the record: the model, its labels and what became of them, and what computes."""
         return {
             "model": self._name,
             "sha256": self._sha256,

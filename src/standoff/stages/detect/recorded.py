@@ -36,9 +36,8 @@ class RecordedDetector(protocols.Detector):
         """All of it."""
         return self._recorded
 
-    @property
-    def description(self) -> dict[str, Any]:
-        """Facts for the record: that nothing was detected anew, which file, of which source, and the true detector.
+    def describe(self) -> dict[str, Any]:
+        """Return facts for the record: that nothing was detected anew, which file, of which source, the true detector.
 
         `class_map` is the true detector's, where it has one.
         """

@@ -24,10 +24,9 @@ class SharedDetector(Detector):
         self._turn = threading.Condition()
         self._next = self._served = 0
 
-    @property
-    def description(self) -> Mapping[str, Any]:
-        """The detector's own."""
-        return self._detector.description
+    def describe(self) -> Mapping[str, Any]:
+        """Return the detector's own."""
+        return self._detector.describe()
 
     def detect(self, frame: Frame) -> Detections:
         """Return what is seen, once it is this caller's turn."""

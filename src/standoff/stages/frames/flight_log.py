@@ -166,9 +166,8 @@ class FlightLog:
         """Tell whether there is a block for each frame, rather than one a second."""
         return len(self.time_s) > 1 and float(np.median(np.diff(self.time_s))) * rate_fps < 1.5
 
-    @property
-    def description(self) -> dict[str, Any]:
-        """What it is, for the record."""
+    def describe(self) -> dict[str, Any]:
+        """Return what it is, for the record."""
         return {
             "origin": self.name,
             "dialect": self.dialect,

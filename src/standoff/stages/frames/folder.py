@@ -157,9 +157,8 @@ class FolderReader:
             time_s = index / self.rate_fps
             yield Shot(index, time_s, picture, path.name, read_photograph(path, time_s).telemetry)
 
-    @property
-    def description(self) -> dict[str, Any]:
-        """What it is, for the record."""
+    def describe(self) -> dict[str, Any]:
+        """Return what it is, for the record."""
         return {
             "name": self._folder.name,
             "kind": "image folder",

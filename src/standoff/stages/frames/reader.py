@@ -142,9 +142,8 @@ class Reader(Protocol):
         """What is odd about what it says, and about what was read of it so far, a clause each."""
         ...
 
-    @property
-    def description(self) -> Mapping[str, Any]:
-        """What it is, for the record."""
+    def describe(self) -> Mapping[str, Any]:
+        """Return what it is, for the record."""
         ...
 
     def close(self) -> None:

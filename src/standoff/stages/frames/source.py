@@ -1,16 +1,17 @@
-"""One door to all sources: open it, iterate once, get frames.
+"""One door to all sources: ask for one, iterate once, get frames.
 
-A reader knows one kind of source (`video.py`, `folder.py`); `FileSource` adds what all kinds share: where to
-stop, the stream's name and the time of capture. A live stream is a third
-reader.
+A reader knows one kind of source (`video.py`, `folder.py`); `FileSource` adds what all kinds share: when it is opened,
+where to stop, the stream's name and the time of capture. A live stream is a third reader.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from datetime import timedelta
+from functools import cached_property, partial
 from itertools import chain
 from os import PathLike
 from pathlib import Path
@@ -34,59 +35,68 @@ _ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:/")
 _FILE_ADDRESS = re.compile(r"file:/*(?:/localhost)?/(?P<path>.*)", re.IGNORECASE)
 
 
+@dataclass(frozen=True, slots=True)
+class _Opened:
+    """What is there once a source is open.
+
+    Attributes:
+        reader: Closed with the source.
+        telemetry: Where the drone's readings come from.
+        shots: Of the part that is wanted; the first is read already.
+    """
+
+    reader: Reader
+    telemetry: TelemetryChoice
+    shots: Iterator[Shot]
+
+
 class FileSource(protocols.Source):
-    """An opened source; iterate over it once.
+    """A film or a folder of pictures, which is opened by the first question about it; iterate over it once.
+
+    What is wrong with it is said then, and again by the next question: a file that comes later can still be opened.
 
     Args:
-        reader: What reads it; closed with the source.
+        read: Opens it, and says where its telemetry comes from; raises SourceError where it cannot be read.
         selection: The part that is wanted.
         stream_id: Name of the stream.
-        telemetry: Where the drone's readings come from.
 
     Attributes:
         stream_id: Name of the stream.
-
-    Raises:
-        SourceError: The part that is wanted holds no picture.
     """
 
     def __init__(
-        self, reader: Reader, selection: Selection, stream_id: str, telemetry: TelemetryChoice | None = None
+        self, read: Callable[[], tuple[Reader, TelemetryChoice]], selection: Selection, stream_id: str
     ) -> None:
         self.stream_id = stream_id
-        self._telemetry = TelemetryChoice() if telemetry is None else telemetry
-        self._reader = reader
+        self._read = read
         self._selection = selection
-        self._shots = self._wanted_shots()
+        self._is_closed = False
+
+    @cached_property
+    def _opened(self) -> _Opened:
+        if self._is_closed:
+            raise ValueError(f"the source {self.stream_id} was closed before it was opened")
+        reader, telemetry = self._read()
+        try:
+            return _Opened(reader, telemetry, _wanted_shots(reader, self._selection))
+        except SourceError:
+            reader.close()
+            raise
 
     @property
     def size_px(self) -> tuple[int, int]:
-        """(width, height) of every frame, upright."""
-        return self._reader.size_px
+        """(width, height) of every frame, upright.
+
+        Raises:
+            SourceError: As `open_source`; so do all questions.
+        """
+        return self._opened.reader.size_px
 
     @property
     def frame_count(self) -> int | None:
         """How many frames it should yield: exact for an image folder and at a constant frame rate, else an estimate."""
-        return self._selection.expected_of(self._reader.total_frames, self._reader.rate_fps)
-
-    def _wanted_shots(self) -> Iterator[Shot]:
-        shots = self._reader.shots(self._selection)
-        first = next(shots, None)
-        stop_s = math.inf if self._selection.stop_s is None else self._selection.stop_s - TIME_ROUNDING_S
-        if first is None or first.time_s >= stop_s:
-            found = "none" if first is None else f"the first one at {first.time_s:.3f} s"
-            raise SourceError(
-                expected=f"pictures from {self._selection.start_s} s on",
-                found=found
-                if self._selection.stop_s is None
-                else f"{found}, to stop before {self._selection.stop_s} s",
-                fix=f"choose a start and a stop inside the source ({self._length()})",
-            )
-        return _until(stop_s, chain([first], shots))
-
-    def _length(self) -> str:
-        total, rate = self._reader.total_frames, self._reader.rate_fps
-        return f"it lasts about {total / rate:.1f} s" if total and rate else "its length is not declared"
+        reader = self._opened.reader
+        return self._selection.expected_of(reader.total_frames, reader.rate_fps)
 
     def __iter__(self) -> Iterator[Frame]:
         return self.frames()
@@ -97,36 +107,41 @@ class FileSource(protocols.Source):
         Raises:
             FrameSizeChanged: A picture has another size than the first.
             SourceTruncated: The source ended before its own header says it should; all its frames came first.
-            SourceError: A picture cannot be read, or has no usable time.
+            SourceError: It cannot be opened, a picture cannot be read, or has no usable time.
         """
-        started_at = self._reader.started_at
-        for shot in self._shots:
+        # The call opens it, so that what is wrong is said here and whoever times frames times no opening.
+        return self._frames_of(self._opened)
+
+    def _frames_of(self, opened: _Opened) -> Iterator[Frame]:
+        started_at = opened.reader.started_at
+        for shot in opened.shots:
+            if self._is_closed:
+                return
             captured_at = None if started_at is None else started_at + timedelta(seconds=shot.time_s)
-            telemetry = self._telemetry.at(shot)
+            telemetry = opened.telemetry.at(shot)
             told_by: ToldBy | None = None if captured_at is None else "file"
             yield Frame(self.stream_id, shot.index, shot.time_s, shot.picture, captured_at, told_by, telemetry)
 
     @property
     def camera_prior(self) -> CameraPrior:
         """What the source itself knows of its camera: its log's focal length, EXIF data, the drone's model, nothing."""
-        return self._telemetry.camera_prior(self._reader)
+        return self._opened.telemetry.camera_prior(self._opened.reader)
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """What does not fit together, was not used or was lost, a clause each; some are known only at the end."""
-        return (*self._reader.warnings, *self._telemetry.warnings)
+        return (*self._opened.reader.warnings, *self._opened.telemetry.warnings)
 
-    @property
-    def description(self) -> dict[str, Any]:
-        """What it is and which part was wanted, for the record; counts grow while it is read."""
-        prior = self.camera_prior
+    def describe(self) -> dict[str, Any]:
+        """Return what it is and which part was wanted, for the record; counts grow while it is read."""
+        reader, prior = self._opened.reader, self.camera_prior
         return {
-            **self._reader.description,
+            **reader.describe(),
             **self._selection._asdict(),
             "warnings": list(self.warnings),
             "frames_expected": self.frame_count,
-            "utc": {"first": self._reader.started_at, "told_by": None if self._reader.started_at is None else "file"},
-            "telemetry": self._telemetry.description,
+            "utc": {"first": reader.started_at, "told_by": None if reader.started_at is None else "file"},
+            "telemetry": self._opened.telemetry.describe(),
             "camera": {
                 "origin": prior.origin,
                 "focal_px": round(float(prior.camera.matrix[0, 0]), 1),
@@ -135,9 +150,10 @@ class FileSource(protocols.Source):
         }
 
     def close(self) -> None:
-        """Let go of the file; frames already yielded stay valid."""
-        self._shots = iter(())
-        self._reader.close()
+        """Let go of the file; frames already yielded stay valid. What was never opened is not opened any more."""
+        self._is_closed = True
+        if "_opened" in vars(self):
+            self._opened.reader.close()
 
     def __enter__(self) -> Self:
         return self
@@ -161,6 +177,30 @@ def local_path(source: str | PathLike[str]) -> Path:
     return Path(path if re.match(r"[A-Za-z]:[/\\]", path) else f"/{path}")
 
 
+def _wanted_shots(reader: Reader, wanted: Selection) -> Iterator[Shot]:
+    """Return the shots of a part, of which the first is read now.
+
+    Raises:
+        SourceError: The part holds no picture.
+    """
+    shots = reader.shots(wanted)
+    first = next(shots, None)
+    stop_s = math.inf if wanted.stop_s is None else wanted.stop_s - TIME_ROUNDING_S
+    if first is None or first.time_s >= stop_s:
+        found = "none" if first is None else f"the first one at {first.time_s:.3f} s"
+        raise SourceError(
+            expected=f"pictures from {wanted.start_s} s on",
+            found=found if wanted.stop_s is None else f"{found}, to stop before {wanted.stop_s} s",
+            fix=f"choose a start and a stop inside the source ({_length(reader)})",
+        )
+    return _until(stop_s, chain([first], shots))
+
+
+def _length(reader: Reader) -> str:
+    total, rate = reader.total_frames, reader.rate_fps
+    return f"it lasts about {total / rate:.1f} s" if total and rate else "its length is not declared"
+
+
 def _until(stop_s: float, shots: Iterator[Shot]) -> Iterator[Shot]:
     for shot in shots:
         if shot.time_s >= stop_s:
@@ -178,7 +218,7 @@ def open_source(
     fps: float | None = None,
     telemetry: str | PathLike[str] | None = None,
 ) -> FileSource:
-    """Open a video file or a folder of images.
+    """Return a video file or a folder of images as a source, which is opened by the first question about it.
 
     Frames carry the index that they have in the whole source, wherever it is started, and the time since
     its first picture, from the presentation timestamps.
@@ -195,9 +235,9 @@ def open_source(
             beside a film (`film.srt`, or `telemetry.srt` in its folder), and the EXIF data of pictures.
 
     Raises:
-        SourceError: It cannot be read, or is empty in the part that is wanted, or the log that is asked for cannot
-            be used.
-        SourceTruncated: Its end, and with it the table of its pictures, is missing.
+        SourceError: At once: a part, a rate or an address that no file has. When it is opened: it cannot be read, or
+            is empty in the part that is wanted, or the log that is asked for cannot be used.
+        SourceTruncated: When it is opened: its end, and with it the table of its pictures, is missing.
     """
     path = local_path(path)
     selection = Selection(start_s, stop_s, every)
@@ -210,14 +250,22 @@ def open_source(
             found=f"the address of a stream, {path}",
             fix="record the stream to a file first; streams are not read yet",
         )
+    return FileSource(partial(_read, path, fps, telemetry), selection, path.stem if stream_id is None else stream_id)
+
+
+def _read(path: Path, fps: float | None, telemetry: str | PathLike[str] | None) -> tuple[Reader, TelemetryChoice]:
+    """Open a file or a folder, and find its telemetry.
+
+    Raises:
+        SourceError: As `open_source`.
+    """
     if not path.exists():
         raise SourceError(
             expected="a video file or a folder of images", found=f"nothing at {path}", fix="check the path"
         )
     reader: Reader = FolderReader(path, fps) if path.is_dir() else VideoReader(path, fps)
     try:
-        chosen = choose_telemetry(reader, path, telemetry)
-        return FileSource(reader, selection, path.stem if stream_id is None else stream_id, chosen)
+        return reader, choose_telemetry(reader, path, telemetry)
     except SourceError:
         reader.close()
         raise

@@ -46,11 +46,10 @@ class TelemetryChoice:
             return reader.camera_prior
         return told_prior(reader.size_px, told, reader.drone, self.log.name, film=True)
 
-    @property
-    def description(self) -> dict[str, Any]:
-        """What it is, for the record."""
+    def describe(self) -> dict[str, Any]:
+        """Return what it is, for the record."""
         if self.log is not None:
-            return self.log.description
+            return self.log.describe()
         return {"origin": "EXIF and XMP of the pictures, where they have any" if self.own else NO_TELEMETRY}
 
 

@@ -277,9 +277,8 @@ class VideoReader:
             found.append(f"{name}: its pixels are not square; {stored} are stretched to {square}")
         return found
 
-    @property
-    def description(self) -> dict[str, Any]:
-        """What it is, for the record; `corrupt_frames` and `skipped_frames` as counted so far.
+    def describe(self) -> dict[str, Any]:
+        """Return what it is, for the record; `corrupt_frames` and `skipped_frames` as counted so far.
 
         `size_px` is of the pictures as they are given, upright and with square pixels.
         """
@@ -295,7 +294,7 @@ class VideoReader:
             "size_px": list(self.size_px),
             "stored_size_px": [self._first.width, self._first.height],
             "pixel_aspect": str(self._header.pixel_aspect or 1),
-            **self.orientation.description,
+            **self.orientation.describe(),
             "stream": self._stream.index,
             "streams": describe_streams(self._container),
             "fps": self.rate_fps,

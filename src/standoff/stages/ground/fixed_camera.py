@@ -84,15 +84,14 @@ class FixedCamera(protocols.Ground):
         self._watched = self._unwatched = self._broken = self._has_moved = False
         self._most_px = 0.0
 
-    @property
-    def description(self) -> dict[str, Any]:
-        """The survey's, and what was seen of the camera."""
-        warnings = list(self.survey.description["warnings"])
+    def describe(self) -> dict[str, Any]:
+        """Return the survey's, and what was seen of the camera."""
+        warnings = list(self.survey.describe()["warnings"])
         if self._has_moved:
             warnings.append(f"{MOVED}, by up to {self._most_px:.0f} px" if self._most_px > 0.0 else MOVED)
         if self._unwatched and not self._watched:
             warnings.append("the picture shows too little to tell whether the camera still stands as it was surveyed")
-        return {**self.survey.description, "warnings": warnings}
+        return {**self.survey.describe(), "warnings": warnings}
 
     def prepare(self, size_px: tuple[int, int]) -> None:
         """Make sure that pictures of a size (width, height) have the survey's shape, before the first frame.

@@ -117,16 +117,15 @@ class FusedGround(protocols.Ground):
             0 if self._survey is None else len(self._survey.survey.points_m),
         )
 
-    @property
-    def description(self) -> dict[str, Any]:
-        """Everything that a record of the run should say about this stage; more once frames have been seen."""
+    def describe(self) -> dict[str, Any]:
+        """Return everything that a record of the run should say about this stage; more once frames have been seen."""
         camera = self._camera if self._camera is not None else self._given_camera
         return {
             "method": self._method,
             "basis": self._tally.text(camera),
             "better": self._tally.better,
             "references": [one.describe() for one in self._given_references],
-            "survey": None if self._survey is None else self._survey.survey.description,
+            "survey": None if self._survey is None else self._survey.survey.describe(),
             "markers": [] if self._markers is None else [place.marker_id for place in self._markers.places],
             "params": asdict(self._params),
             "camera": None if camera is None else camera.origin,
@@ -144,7 +143,7 @@ class FusedGround(protocols.Ground):
         if self._survey is None:
             return []
         missed = [self._survey.missed] if self._survey.missed else []
-        return [*self._survey.survey.description["warnings"], *missed]
+        return [*self._survey.survey.describe()["warnings"], *missed]
 
     @property
     def _method(self) -> str:

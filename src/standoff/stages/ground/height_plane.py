@@ -70,9 +70,8 @@ class HeightPlane:
         names = ", ".join(map(repr, self.doubtful))
         return [f"the others contradict the height (z_m) of {names}, which is left out: a mistake, or no ground"]
 
-    @property
-    def description(self) -> dict[str, Any]:
-        """For the record; JSON types only."""
+    def describe(self) -> dict[str, Any]:
+        """Return what it is, for the record; JSON types only."""
         return {
             "slope_deg": self.slope_deg,
             "rise_east": float(self.rise[0]),

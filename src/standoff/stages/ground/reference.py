@@ -84,9 +84,8 @@ class ReferenceGround(protocols.Ground):
         self._outlined = False
         self._corners_told = len(self._shape.turns_onto_itself()) == 1 or self._hint is not None
 
-    @property
-    def description(self) -> dict[str, Any]:
-        """Everything that a record of the run should say about this stage."""
+    def describe(self) -> dict[str, Any]:
+        """Return everything that a record of the run should say about this stage."""
         return {
             "kind": "reference",
             "basis": reference_basis(self._shape),

@@ -86,10 +86,9 @@ class ScaleWatch(protocols.Ground):
         self._warning, self._worst_log = "", 0.0
         self._impossible = ""
 
-    @property
-    def description(self) -> dict[str, Any]:
-        """The inner stage's, and what is odd about its lens and, by the sizes of what is seen, about its metres."""
-        inner = dict(self.inner.description)
+    def describe(self) -> dict[str, Any]:
+        """Return the inner stage's, and what is odd about its lens and, by the sizes of what is seen, its metres."""
+        inner = dict(self.inner.describe())
         inner["warnings"] = [*lens_warnings(self._camera), *inner.get("warnings", ()), *self._warnings()]
         seen = {name: len(sizes.logs) for name, sizes in self._sizes.items() if sizes.logs}
         ratios = {name: float(np.exp(np.median(sizes.logs))) for name, sizes in self._sizes.items() if sizes.logs}

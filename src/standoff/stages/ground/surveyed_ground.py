@@ -27,7 +27,7 @@ class SurveyedGround(protocols.Ground):
     """Give the same map for every frame of a camera that does not move.
 
     The map minimises the distances in the picture between the points, freed from lens distortion, and the
-    pictures of their surveyed positions. `description` holds the residuals of every point and warnings.
+    pictures of their surveyed positions. `describe` tells the residuals of every point and warnings.
 
     A frame of another size than the survey's, but of the same shape (aspect ratio within one per cent), gets the
     map scaled to it; of another shape, `NoGroundMap("picture size differs from the survey")`, because nobody
@@ -54,7 +54,6 @@ class SurveyedGround(protocols.Ground):
         time_s: As given.
         origin: As given.
         fit: Residuals and covariance.
-        description: For the record; JSON types only.
 
     Raises:
         GroundError: The points do not define a map.
@@ -110,12 +109,11 @@ class SurveyedGround(protocols.Ground):
         self._description = _describe(self.fit, self._surveyed, names, point_sigma_px)
         self._description["warnings"] += warnings
         if self.plane is not None:
-            self._description["heights"] = self.plane.description
+            self._description["heights"] = self.plane.describe()
             self._description["basis"] += f"; {self.plane.text}"
 
-    @property
-    def description(self) -> dict[str, Any]:
-        """What the fit says of points and map, for the record."""
+    def describe(self) -> dict[str, Any]:
+        """Return what the fit says of points and map, for the record."""
         return self._description
 
     @property

@@ -10,9 +10,8 @@ from standoff.stages.ground.basis import HELP
 class Unmapped(protocols.Ground):
     """Say in every frame that no ground is configured."""
 
-    @property
-    def description(self) -> dict[str, str]:
-        """That there is nothing, and what would help."""
+    def describe(self) -> dict[str, str]:
+        """Return that there is nothing, and what would help."""
         return {"method": "none", "basis": "nothing: no ground is configured", "better": HELP}
 
     def update(self, frame: Frame, detections: Detections, motion: CameraMotion | NoCameraMotion) -> NoGroundMap:

@@ -52,9 +52,8 @@ class AlarmLoad:
         names = sorted(CLASSES[self._class_of[one]].name for one in event.track_ids if one in self._class_of)
         self._between.setdefault(event.hazard_id, " and ".join(names).replace("_", " "))
 
-    @property
-    def description(self) -> dict[str, float | None]:
-        """Hours of workers in sight, alarms, and alarms for each hour; None where too little was seen to tell."""
+    def describe(self) -> dict[str, float | None]:
+        """Return hours of workers in sight, alarms, and alarms for each hour; None where too little was seen."""
         hours, alarms = self._worker_s / 3600.0, len(self._likeliest)
         rate = alarms / hours if hours >= _LEAST_HOURS else None
         return {"worker_hours": hours, "alarms": alarms, "per_worker_hour": rate}
@@ -62,7 +61,7 @@ class AlarmLoad:
     @property
     def warnings(self) -> list[str]:
         """That there are too many to be heeded, and which setting would leave fewer."""
-        rate = self.description["per_worker_hour"]
+        rate = self.describe()["per_worker_hour"]
         if rate is None or rate <= MOST_PER_HOUR:
             return []
         kind, count = Counter(self._between.values()).most_common(1)[0]

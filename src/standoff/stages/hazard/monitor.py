@@ -58,11 +58,10 @@ class HazardMonitor(protocols.HazardMonitor):
         self._looked_s = math.inf
         self._zones = ZoneRule(self._given_zones, self._params)
 
-    @property
-    def description(self) -> dict[str, Any]:
-        """What there is to say of the stream so far, for the record."""
+    def describe(self) -> dict[str, Any]:
+        """Return what there is to say of the stream so far, for the record."""
         warnings = [*self._follow.warnings, *self._zones.warnings, *self._load.warnings]
-        return {"alarms": self._load.description, "warnings": warnings}
+        return {"alarms": self._load.describe(), "warnings": warnings}
 
     def update(
         self,

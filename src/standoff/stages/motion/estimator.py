@@ -61,9 +61,8 @@ class MotionEstimator(protocols.CameraMotionEstimator):
         self._zoom = ZoomWatch(self._params.zoom_rate)
         self.reset()
 
-    @property
-    def description(self) -> dict[str, Any]:
-        """Everything that a record of the run should say about this stage."""
+    def describe(self) -> dict[str, Any]:
+        """Return everything that a record of the run should say about this stage."""
         return {
             "params": asdict(self._params),
             "lens_distortion_removed": self._given_camera is not None,

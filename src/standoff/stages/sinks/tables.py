@@ -15,10 +15,19 @@ import numpy as np
 import pyarrow as pa
 
 from standoff import __version__
-from standoff.clips import COLUMNS, FOOT_COLUMNS, Column, metadata_of, schema_of
+from standoff.clips import (
+    COLUMNS,
+    FOOT_COLUMNS,
+    FRAME_COLUMNS,
+    MAP_COLUMNS,
+    Column,
+    map_values,
+    metadata_of,
+    schema_of,
+)
 from standoff.core.classes import CLASSES
 from standoff.core.homography import BoolArray, FloatArray
-from standoff.core.types import FrameResult, GroundMap, IntArray, NoGroundMap, Outcome, TextArray, WatchedGround
+from standoff.core.types import FrameResult, IntArray, Outcome, TextArray, WatchedGround
 from standoff.core.watched_shares import around_tracks
 from standoff.files.json_text import plain
 from standoff.stages.sinks.params import TableParams
@@ -27,15 +36,8 @@ from standoff.stages.sinks.parquet_parts import Columns, ParquetParts
 _CLASS = pa.dictionary(pa.int32(), pa.string())
 _NAMES: TextArray = np.array([site_class.name for site_class in CLASSES], dtype=object)
 
-_FRAME_COLUMNS = (
-    ("stream_id", pa.string(), "", "name of the stream"),
-    ("frame", pa.int64(), "", "index in the source, from 0, skipped frames counted"),
-    ("time_s", pa.float64(), "s", "presentation timestamp from the start of the source"),
-    ("captured_at", pa.timestamp("us", tz="UTC"), "", "when the picture was taken; null: nobody tells"),
-    ("told_by", pa.string(), "", "who tells when it was taken: file, arrival, rtcp, telemetry; null: nobody"),
-)
 _TRACK_COLUMNS = (
-    *_FRAME_COLUMNS,
+    *FRAME_COLUMNS,
     ("track_id", pa.int64(), "", "unique in the stream, never used again"),
     ("class", _CLASS, "", "what it is"),
     ("score", pa.float64(), "", "confidence of the last detection, 0 to 1"),
@@ -62,7 +64,7 @@ _TRACK_COLUMNS = (
 )
 _ZONES_COLUMN = ("zones", pa.list_(pa.string()), "", "names of the zones that an open hazard of this track is about")
 _PROXIMITY_COLUMNS = (
-    *_FRAME_COLUMNS,
+    *FRAME_COLUMNS,
     ("track_a", pa.int64(), "", "the smaller track id"),
     ("track_b", pa.int64(), "", "the larger track id"),
     ("class_a", _CLASS, "", "class of track_a"),
@@ -82,16 +84,11 @@ _PROXIMITY_COLUMNS = (
     ("excuse", pa.string(), "", "why it is no hazard however near; empty where it may be one"),
 )
 _FRAMES_COLUMNS = (
-    *_FRAME_COLUMNS,
+    *FRAME_COLUMNS,
     ("detected", pa.bool_(), "", "false: the detector rested in this frame"),
     ("detections", pa.int64(), "", "number of detections; null where the detector rested"),
     ("tracks", pa.int64(), "", "number of live tracks"),
-    ("map", pa.bool_(), "", "whether there is a ground map; false: nothing was measured in this frame"),
-    ("map_method", pa.string(), "", "how the map was found; null without a map"),
-    ("map_reason", pa.string(), "", "why there is no map; null with a map"),
-    ("map_age_s", pa.float64(), "s", "since the map was last observed; null without a map"),
-    ("scale_m_per_px", pa.float64(), "m/px", "Eq. 6's scale; null without a map"),
-    ("image_to_ground", pa.list_(pa.float64()), "", "3 x 3, undistorted pixels to metres, row by row; null without"),
+    *MAP_COLUMNS,
     ("watched_share", pa.float64(), "", "part of the picture's ground where a worker would be found; null: not judged"),
     ("unwatched_reason", pa.string(), "", "why most of the rest is not watched; null where all of it is"),
     ("missed_share", pa.float64(), "", "of workers on watched ground, share missed in one picture; null: unknown"),
@@ -224,20 +221,6 @@ def _seen(track_id: IntArray, result: FrameResult) -> BoolArray:
     return np.isin(track_id, result.tracks.track_id[result.tracks.observed])
 
 
-def _map_values(ground: GroundMap | NoGroundMap) -> dict[str, Any]:
-    if isinstance(ground, NoGroundMap):
-        absent = ("map_method", "map_age_s", "scale_m_per_px", "image_to_ground")
-        return {"map": False, "map_reason": ground.reason, **dict.fromkeys(absent)}
-    return {
-        "map": True,
-        "map_reason": None,
-        "map_method": ground.method,
-        "map_age_s": ground.age_s,
-        "scale_m_per_px": ground.scale_m_per_px,
-        "image_to_ground": ground.image_to_ground.ravel().tolist(),
-    }
-
-
 def _watched_values(watched: WatchedGround) -> dict[str, Any]:
     return {
         "watched_share": watched.share,
@@ -252,7 +235,7 @@ def _frame_rows(result: FrameResult) -> Columns:
         "detected": result.detected,
         "detections": len(result.detections) if result.detected else None,
         "tracks": len(result.tracks),
-        **_map_values(result.ground),
+        **map_values(result.ground),
         **_watched_values(result.watched),
     }
     return {**_frame_columns(result, 1), **{name: [value] for name, value in values.items()}}

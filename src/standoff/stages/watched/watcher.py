@@ -76,9 +76,8 @@ class GroundWatcher(protocols.GroundWatcher):
         self._looks = self._judged = self._judged_small = 0
         self._usual_px = 0.0
 
-    @property
-    def description(self) -> Mapping[str, Any]:
-        """What is taken for granted of the detector, for the record."""
+    def describe(self) -> Mapping[str, Any]:
+        """Return what is taken for granted of the detector, for the record."""
         finding = self._finding
         return {
             "worker_height_px": finding.height_px,

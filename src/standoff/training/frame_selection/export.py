@@ -115,7 +115,7 @@ def label_frames(plan: LabelPlan, detector: Detector, folder: Path, progress: Pr
 def _every_s(plan: LabelPlan, source: FileSource) -> float:
     if plan.every_s is not None:
         return plan.every_s
-    duration_s = source.description["duration_s"]
+    duration_s = source.describe()["duration_s"]
     return duration_s / (_LOOKED_AT_FOR_ONE * plan.selection.frames) if duration_s else _DEFAULT_EVERY_S
 
 

@@ -144,7 +144,7 @@ class Gate:
     def __init__(self, float_model: Path, pictures: Sequence[LabelledPicture], step: Callable[[], None]) -> None:
         self._float_model = float_model
         detector = _open(float_model)
-        self._known = set(detector.description["class_map"].values())
+        self._known = set(detector.describe()["class_map"].values())
         self._pictures: list[LabelledPicture] = []
         self.unreadable: list[Path] = []
         found = []
