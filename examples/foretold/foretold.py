@@ -1,6 +1,6 @@
 """How early breaches are foretold, and how often in vain: hours of simulated work, without a picture.
 
-python examples/foretold.py [--hours 20] [--seed 0] [--cast ordinary] [--error 1.0] [--json FILE] [--quiet]
+python examples/foretold/foretold.py [--hours 20] [--seed 0] [--cast ordinary] [--error 1.0] [--json FILE] [--quiet]
 
 A cast of `standoff simulate` works: an ordinary site for a quarter of an hour each; or `busy` and `mobile`, the hard
 cases, in which everybody works within machines' circles, for two minutes each. What a camera would tell of them is
@@ -275,7 +275,7 @@ def _follow(event: Hazard, open_at: dict[str, tuple[Pair, float]], spans: dict[P
 
 def true_breaches(shift: Shift) -> dict[Pair, list[Breach]]:
     """Return all that happened, of each pair of a worker and a machine."""
-    parked = _truly_parked(shift)
+    parked = truly_parked(shift)
     breaches: dict[Pair, list[Breach]] = {}
     for a in np.flatnonzero(~IS_EQUIPMENT[shift.class_id]).tolist():
         for b in np.flatnonzero(IS_EQUIPMENT[shift.class_id]).tolist():
@@ -295,7 +295,7 @@ def true_breaches(shift: Shift) -> dict[Pair, list[Breach]]:
     return breaches
 
 
-def _truly_parked(shift: Shift) -> BoolArray:
+def truly_parked(shift: Shift) -> BoolArray:
     """Return (T, E) who has truly not moved for a minute; never an excavator."""
     steps_m = np.linalg.norm(np.diff(shift.xy_m, axis=0, prepend=shift.xy_m[:1]), axis=2)
     frame = np.arange(len(steps_m))[:, None]
