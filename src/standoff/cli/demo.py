@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 def demo(
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the outputs.")] = Path("demo"),
     model: Annotated[
-        str | None, typer.Option(help="Detector: site (the default) or site-int8 (ours), or an ONNX file.")
+        str | None, typer.Option(help="Detector: site (ours, the default), or an ONNX file.")
     ] = None,
     detections: Annotated[
         Path | None, typer.Option(help="Replay the detections of an earlier demo: its folder, or its table.")

@@ -31,7 +31,7 @@ def detection(
     ],
     model: Annotated[
         list[str],
-        typer.Option(help="Detector: site, site-int8 (ours) or ONNX; may be repeated.", show_default=False),
+        typer.Option(help="Detector: site (ours) or ONNX; may be repeated.", show_default=False),
     ],
     split: Annotated[
         Split | None,

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 def label(
     source: Annotated[Path, typer.Argument(help="Video file, or a folder of pictures.", show_default=False)],
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for pictures and boxes.", show_default=False)],
-    model: Annotated[str, typer.Option(help="Detector: site or site-int8 (ours), or ONNX.")] = "site",
+    model: Annotated[str, typer.Option(help="Detector: site (ours), or ONNX.")] = "site",
     frames: Annotated[int, typer.Option(min=1, help="How many to choose, at most.")] = 100,
     every: Annotated[
         float | None, typer.Option(min=0, help="Look each so many seconds. Absent: at ten times as many as chosen.")

@@ -185,7 +185,7 @@ class Settings(BaseSettings):
 
     model: Annotated[
         ShippedModel | Path,
-        Field(description="The detector: site or site-int8 (ours), or an ONNX file (see `standoff export`)."),
+        Field(description="The detector: site (ours), or an ONNX file (see `standoff export`)."),
     ] = "site"
     detections: Annotated[
         Path | None,

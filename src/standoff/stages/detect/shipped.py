@@ -8,7 +8,7 @@ from typing import Final, Literal, get_args
 
 from standoff.core.errors import ModelError
 
-ShippedModel = Literal["site", "site-int8"]
+ShippedModel = Literal["site"]
 SHIPPED_MODELS: Final[tuple[ShippedModel, ...]] = get_args(ShippedModel)
 
 
