@@ -1,6 +1,6 @@
 """Make a network surer, or less sure, of all that it finds: its scores then mean what the tracker's settings expect.
 
-    python surer.py RUN/network.cfg RUN/best.weights 0.6 OUT.weights
+    python surer.py RUN/network.cfg RUN/best.weights 0.4 OUT.weights
 
 adds so much to the logit of every head's objectness. Which boxes are surer than which stays what it was, and so does
 every average precision.
