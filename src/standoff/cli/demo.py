@@ -17,9 +17,7 @@ if TYPE_CHECKING:
 
 def demo(
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the outputs.")] = Path("demo"),
-    model: Annotated[
-        str | None, typer.Option(help="Detector: site (ours, the default), or an ONNX file.")
-    ] = None,
+    model: Annotated[str | None, typer.Option(help="Detector: site (ours, the default), or an ONNX file.")] = None,
     detections: Annotated[
         Path | None, typer.Option(help="Replay the detections of an earlier demo: its folder, or its table.")
     ] = None,
