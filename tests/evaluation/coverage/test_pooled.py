@@ -33,6 +33,7 @@ def stated_as(share: float, samples: Sequence[ClipSamples]) -> list[ClipSamples]
     return [replace(one, pairs=replace(one.pairs, sigma_m=share * one.pairs.sigma_m)) for one in samples]
 
 
+@pytest.mark.live
 def test_the_stated_errors_of_pooled_clips_are_true(tmp_path: Path) -> None:
     samples = [samples_of(preset, seed, tmp_path, frames=8, clutter=0.02) for preset, seed in _QUICK]
     row = pooled(samples)

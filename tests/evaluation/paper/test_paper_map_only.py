@@ -182,6 +182,7 @@ def test_what_the_monitor_is_told_of_camera_and_height(
     assert trial.describe()["camera"] == ("file" if camera else "unknown")
 
 
+@pytest.mark.live
 def test_the_map_is_in_table_and_report(fused: ClipResult, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     print_results([fused, fused])
     said = capsys.readouterr().out

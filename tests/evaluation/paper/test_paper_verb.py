@@ -39,7 +39,7 @@ def figures_of(clip: dict[str, Any]) -> dict[str, dict[str, Any]]:
     return {figure["name"]: figure for figure in clip["paper"]}
 
 
-@pytest.fixture(scope="module", params=["paper", "paper+tls", "oriented"])
+@pytest.fixture(scope="module", params=["paper", pytest.param("paper+tls", marks=pytest.mark.live), "oriented"])
 def measured(request: pytest.FixtureRequest, clip_folder: Path) -> dict[str, Any]:
     return first_clip(clip_folder, "--method", request.param)
 

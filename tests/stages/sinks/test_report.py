@@ -149,6 +149,7 @@ def test_what_the_end_of_the_stream_closes_is_closed(tmp_path: Path, results: li
     assert "end of stream" in text
 
 
+@pytest.mark.live
 def test_many_pairs_and_frames_make_a_page_of_a_few_megabytes(tmp_path: Path) -> None:
     site = FakeSite(SITE, tracks=16)
     some = [site.result(index) for index in range(50)]
