@@ -19,7 +19,7 @@ from standoff.cli.coverage_tables import coverage_tables
 from standoff.evaluation.coverage import score_samples
 from standoff_sim.clip.presets import PRESETS
 
-WITHOUT_WORK = ("board",)
+WITH_WORK = tuple(name for name in PRESETS if name != "board")
 
 
 def main() -> None:
@@ -28,11 +28,11 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=30, help="of each preset")
     parser.add_argument("--first", type=int, default=1001, help="seed")
     parser.add_argument("--frames", type=int, default=15, help="of each clip, five a second")
-    parser.add_argument("--preset", action="append", choices=[name for name in PRESETS if name not in WITHOUT_WORK])
+    parser.add_argument("--preset", action="append", choices=WITH_WORK)
     parser.add_argument("--json", type=Path, help="file for all figures")
     args = parser.parse_args()
-    presets = args.preset or [name for name in PRESETS if name not in WITHOUT_WORK]
-    clips = [(preset, seed) for seed in range(args.first, args.first + args.seeds) for preset in presets]
+    seeds = range(args.first, args.first + args.seeds)
+    clips = [(preset, seed) for seed in seeds for preset in args.preset or WITH_WORK]
     samples = []
     with progress("clips", len(clips), unit="clips") as on_clip:
         for preset, seed in clips:
