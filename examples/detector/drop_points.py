@@ -13,7 +13,8 @@ from pathlib import Path
 
 from torch import Tensor
 
-from standoff.training.darknet.cfg import POINT_VALUES, parse_cfg
+from standoff.training.darknet.cfg import parse_cfg
+from standoff.training.darknet.layers import POINT_VALUES
 from standoff.training.darknet.network import DarknetNetwork
 from standoff.training.darknet.weights import load_weights, save_weights
 

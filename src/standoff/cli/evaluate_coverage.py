@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from standoff.cli.runs_and_clips import JsonFile, RunsAndClips, pairs_of_folders
+from standoff.cli.scoring_arguments import JsonFile, RunsAndClips, pairs_of_folders
 
 
 def coverage(

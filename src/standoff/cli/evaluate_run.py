@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from standoff.cli.runs_and_clips import JsonFile
+from standoff.cli.scoring_arguments import JsonFile
 
 
 def evaluate_run(

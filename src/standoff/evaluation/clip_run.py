@@ -16,7 +16,6 @@ from standoff.clips import Clip, RunFolder, read_detections
 from standoff.config import Settings, recorded_settings
 from standoff.core.errors import DataError
 from standoff.core.types import Severity
-from standoff.evaluation.beside_truth import check_same_film
 from standoff.evaluation.matching import NOTHING
 from standoff.evaluation.paper.answers import both_radii_m
 from standoff.evaluation.paper.localisation import ClassLocalisation, score_localisation
@@ -24,6 +23,7 @@ from standoff.evaluation.paper.map_only import MapScore, score_map
 from standoff.evaluation.paper.monitor_setup import MonitorSetup, build_monitor, settings_for
 from standoff.evaluation.paper.monitored_clip import Notes, check_frame, open_clip_video
 from standoff.evaluation.paper.pairs import PairGroup, group_pairs, pair_series
+from standoff.evaluation.run_and_clip import check_same_film
 from standoff.evaluation.run_frames import RunFrame, read_run_frames
 from standoff.monitor import Run
 

@@ -13,7 +13,7 @@ from stages.ground.test_reference import FOOTING, NOTHING, QUADRILATERAL, detect
 from standoff.core.camera import CameraPrior
 from standoff.core.types import GroundMap, NoCameraMotion
 from standoff.stages.ground import FusedGround, FusedParams, Reference, ReferenceGround, ReferenceParams, ReferenceShape
-from standoff.stages.ground.reference_place import GivenPlace
+from standoff.stages.ground.reference_box import GivenPlace
 from standoff.stages.ground.solid import SolidState
 
 SHAPE = ReferenceShape.rectangle(2.0, 2.89)

@@ -15,7 +15,7 @@ from standoff.core.homography import FloatArray
 from standoff.core.pose import View
 from standoff.core.types import CameraMotion, Detections, GroundMap, ImageArray, NoCameraMotion, NoGroundMap
 from standoff.stages.ground import FusedGround, FusedParams, Reference, ReferenceParams, ReferenceShape
-from standoff.stages.ground.reference_place import NOT_SEEN, NOT_YET, GivenPlace
+from standoff.stages.ground.reference_box import NOT_SEEN, NOT_YET, GivenPlace
 from standoff.stages.ground.solid import SolidState
 
 SHAPE = ReferenceShape.rectangle(2.0, 2.89)

@@ -11,7 +11,7 @@ from standoff.core.errors import GroundError
 from standoff.core.types import Detections, Frame, GroundMap, NoCameraMotion
 from standoff.stages.frames import frame_from_array
 from standoff.stages.ground import ReferenceGround, ReferenceShape, SurveyedGround
-from standoff.stages.ground.reference_place import GivenPlace
+from standoff.stages.ground.reference_box import GivenPlace
 
 STILL = NoCameraMotion("not estimated")
 

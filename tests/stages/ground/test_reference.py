@@ -16,7 +16,7 @@ from standoff.core.types import Detections, GroundMap, ImageArray, NoCameraMotio
 from standoff.stages.ground import ReferenceGround, ReferenceParams, ReferenceShape
 from standoff.stages.ground.params import ReferenceMethod
 from standoff.stages.ground.reference import AMBIGUOUS, IMPLAUSIBLE, LOST
-from standoff.stages.ground.reference_place import NOT_SEEN, NOT_YET, GivenPlace
+from standoff.stages.ground.reference_box import NOT_SEEN, NOT_YET, GivenPlace
 
 METHODS: tuple[ReferenceMethod, ...] = ("paper", "paper+tls", "oriented")
 FOOTING = ReferenceShape.square(2.89)

@@ -12,7 +12,8 @@ from standoff.core.errors import ModelError
 from standoff.training import efficientnet_lite0_cfg, yolo_fastest_xl_cfg, yolov3_cfg, yolov3_tiny_cfg
 from standoff.training.architectures import ARCHITECTURES
 from standoff.training.architectures.efficientnet_lite import BACKBONE_CONVOLUTIONS
-from standoff.training.darknet.cfg import Convolutional, Layer, Yolo, parse_cfg, read_cfg
+from standoff.training.darknet.cfg import parse_cfg, read_cfg
+from standoff.training.darknet.layers import Convolutional, Layer, Yolo
 from standoff.training.darknet.network import DarknetNetwork, DecodedNetwork
 from standoff.training.darknet.shapes import Shape, largest_stride, layer_shapes, layer_strides, weights_numbers
 from standoff.training.darknet.weights import load_weights

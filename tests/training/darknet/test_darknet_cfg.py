@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 from standoff.core.errors import ModelError
-from standoff.training.darknet.cfg import Convolutional, Maxpool, Route, Shortcut, Yolo, parse_cfg, read_cfg
+from standoff.training.darknet.cfg import parse_cfg, read_cfg
+from standoff.training.darknet.layers import Convolutional, Maxpool, Route, Shortcut, Yolo
 
 NET = "[net]\nwidth=64\nheight=32\nchannels=3\n"
 HEAD = "[yolo]\nmask=1\nanchors=1,2, 3,4\nclasses=2\nnum=2\n"

@@ -18,7 +18,8 @@ from training.darknet.published_cfgs import PUBLISHED
 from standoff.training import export_darknet, yolov3_cfg, yolov3_tiny_cfg
 from standoff.training.architectures import ARCHITECTURES
 from standoff.training.architectures.yolov3 import YOLOV3_ANCHORS_PX
-from standoff.training.darknet.cfg import Yolo, parse_cfg
+from standoff.training.darknet.cfg import parse_cfg
+from standoff.training.darknet.layers import Yolo
 
 Picture = npt.NDArray[np.uint8]
 Rows = npt.NDArray[np.float32]

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from laws import examples
 from tolerances import FLOAT32_LOSS_REL
 
-from standoff.training.darknet.cfg import Yolo
+from standoff.training.darknet.layers import Yolo
 from standoff.training.pictures.batches import Batch
 from standoff.training.run.loss import LossParams, complete_iou, yolo_loss
 

@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 from training.run.test_loss import HEADS, STRICT, _batch, _raw, _some_truth
 
-from standoff.training.darknet.cfg import POINT_VALUES, Yolo
+from standoff.training.darknet.layers import POINT_VALUES, Yolo
 from standoff.training.darknet.network import LOG_SIGMA
 from standoff.training.pictures.batches import Batch
 from standoff.training.run.loss import yolo_loss

@@ -21,7 +21,8 @@ from standoff.labels.read import CUT_GROUP
 from standoff.labels.splits import spread
 from standoff.stages.detect import DetectParams, OnnxDetector
 from standoff.stages.frames import ArrayPicture
-from standoff.training.darknet.cfg import Yolo, parse_cfg, read_cfg
+from standoff.training.darknet.cfg import parse_cfg, read_cfg
+from standoff.training.darknet.layers import Yolo
 from standoff.training.darknet.network import DarknetNetwork, DecodedNetwork
 from standoff.training.darknet.weights import load_weights
 from standoff.training.run.card import card_text

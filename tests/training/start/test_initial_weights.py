@@ -7,7 +7,8 @@ import pytest
 import torch
 
 from standoff.training import efficientnet_lite0_cfg, yolo_fastest_xl_cfg
-from standoff.training.darknet.cfg import Convolutional, parse_cfg
+from standoff.training.darknet.cfg import parse_cfg
+from standoff.training.darknet.layers import Convolutional
 from standoff.training.darknet.network import DarknetNetwork, DecodedNetwork
 from standoff.training.start.initial_weights import head_convolutions, initialize_layers
 

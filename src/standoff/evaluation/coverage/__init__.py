@@ -11,9 +11,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from standoff.evaluation.beside_truth import read_each
 from standoff.evaluation.coverage.samples import ClipSamples, PairSamples, PositionSamples, read_samples
 from standoff.evaluation.coverage.score import CoverageResult, PairRow, PositionRow, score_samples
+from standoff.evaluation.run_and_clip import read_each
 
 __all__ = [
     "ClipSamples",

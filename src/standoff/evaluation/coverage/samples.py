@@ -10,10 +10,10 @@ import numpy as np
 from standoff.core.classes import CLASSES
 from standoff.core.homography import FloatArray
 from standoff.core.types import IntArray, TextArray
-from standoff.evaluation.beside_truth import BesideTruth, read_beside_truth
 from standoff.evaluation.coverage.site_frame import rests_on_reference, shared_turning
 from standoff.evaluation.matching import NOTHING
 from standoff.evaluation.paper.corner_order import CornerOrder
+from standoff.evaluation.run_and_clip import BesideTruth, read_beside_truth
 
 
 @dataclass(frozen=True, slots=True, eq=False)

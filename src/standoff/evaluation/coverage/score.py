@@ -13,10 +13,10 @@ import numpy as np
 from standoff.core.errors import DataError
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import IntArray
-from standoff.evaluation.beside_truth import SIGHTS
 from standoff.evaluation.coverage.samples import ClipSamples
 from standoff.evaluation.paper.metrics import DistanceScore, score_distances
 from standoff.evaluation.resampling import LEAST_GROUPS, draw_groups, interval_of
+from standoff.evaluation.run_and_clip import SIGHTS
 from standoff.evaluation.stated_errors import (
     ONE_SIGMA,
     PROBABILITIES,

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from standoff.evaluation.beside_truth import read_each
+from standoff.evaluation.run_and_clip import read_each
 from standoff.evaluation.watched.samples import WorkerSamples, read_worker_samples
 from standoff.evaluation.watched.score import Missed, WatchedResult, score_watched
 

@@ -13,8 +13,8 @@ from standoff.core.finding import WorkerFinding
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import IntArray
 from standoff.core.watched_ground import COLUMNS, ROWS, cell_of
-from standoff.evaluation.beside_truth import WHOLE, BesideTruth, read_beside_truth
 from standoff.evaluation.matching import NOTHING
+from standoff.evaluation.run_and_clip import WHOLE, BesideTruth, read_beside_truth
 
 _RADIUS_M = np.array([site_class.action_radius_m for site_class in CLASSES])
 

@@ -18,7 +18,7 @@ from standoff.stages.ground.point_fit import belief_from_points, fit_points
 from standoff.stages.ground.pose_map import map_from_view
 from standoff.stages.ground.quadrilateral import Quadrilateral
 from standoff.stages.ground.reference import ReferenceGround, rectified_scale_m_per_px
-from standoff.stages.ground.reference_place import GivenPlace
+from standoff.stages.ground.reference_box import GivenPlace
 from standoff.stages.ground.scale_watch import ScaleWatch
 from standoff.stages.ground.shape import ReferenceShape
 from standoff.stages.ground.size_scale import scale_from_sizes, unit_hint

@@ -18,7 +18,7 @@ from standoff.stages.ground.correspondence import camera_misfit_px, turn_from_be
 from standoff.stages.ground.outline import OutlineFinder
 from standoff.stages.ground.params import ReferenceParams
 from standoff.stages.ground.quadrilateral import ORDERS, Quadrilateral
-from standoff.stages.ground.reference_place import NOT_SEEN, GivenPlace, detected_box
+from standoff.stages.ground.reference_box import NOT_SEEN, GivenPlace, detected_box
 from standoff.stages.ground.shape import ReferenceShape
 
 LOST = "the reference is lost"

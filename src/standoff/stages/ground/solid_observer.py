@@ -18,7 +18,7 @@ from standoff.stages.ground.params import ReferenceParams
 from standoff.stages.ground.placement import Placement, Through
 from standoff.stages.ground.pose_filter import Estimate
 from standoff.stages.ground.projection import project, project_with_jacobians
-from standoff.stages.ground.reference_place import NOT_SEEN, GivenPlace, detected_box
+from standoff.stages.ground.reference_box import NOT_SEEN, GivenPlace, detected_box
 from standoff.stages.ground.shape import ReferenceShape
 from standoff.stages.ground.solid import HEIGHT, SolidState
 from standoff.stages.ground.solid_choice import Found

@@ -8,7 +8,8 @@ from typing import Final
 
 from standoff.core.errors import ModelError
 from standoff.training.architectures.composer import Anchors
-from standoff.training.darknet.cfg import POINT_VALUES, parse_cfg
+from standoff.training.darknet.cfg import parse_cfg
+from standoff.training.darknet.layers import POINT_VALUES
 
 _SECTION: Final = re.compile(r"^\s*\[(\w+)\]", re.MULTILINE)
 _POINT: Final = re.compile(r"^\s*ground_point\s*=\s*1", re.MULTILINE)

@@ -8,10 +8,10 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from standoff.training.darknet.cfg import (
+from standoff.training.darknet.cfg import DarknetCfg
+from standoff.training.darknet.layers import (
     POINT_VALUES,
     Convolutional,
-    DarknetCfg,
     Dropout,
     Layer,
     Maxpool,

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from standoff.core.errors import ModelError
-from standoff.training.darknet.cfg import Convolutional, DarknetCfg, Layer, Maxpool, Route, Shortcut, Upsample, Yolo
+from standoff.training.darknet.cfg import DarknetCfg
+from standoff.training.darknet.layers import Convolutional, Layer, Maxpool, Route, Shortcut, Upsample, Yolo
 
 _LARGEST_INPUT_PX = 8192
 """Twice the width of 4K: no network was trained for more, and a misprint should not fill the memory."""

@@ -19,7 +19,7 @@ from torch import Tensor
 from torch.nn import functional
 from typing_extensions import Doc
 
-from standoff.training.darknet.cfg import POINT_VALUES, Yolo
+from standoff.training.darknet.layers import POINT_VALUES, Yolo
 from standoff.training.darknet.network import points_of
 from standoff.training.pictures.batches import Batch
 from standoff.training.run.point_loss import point_loss

@@ -21,7 +21,8 @@ from torch import nn
 
 from standoff.core.errors import ModelError
 from standoff.stages.detect import POINTS_OUTPUT, ModelCard
-from standoff.training.darknet.cfg import Convolutional, DarknetCfg, Yolo
+from standoff.training.darknet.cfg import DarknetCfg
+from standoff.training.darknet.layers import Convolutional, Yolo
 from standoff.training.darknet.network import ConvolutionBlock, DarknetNetwork
 from standoff.training.quantization.onnx_file import is_quantized, read_own_model
 

@@ -16,7 +16,7 @@ from typing import Final
 import torch
 from torch import nn
 
-from standoff.training.darknet.cfg import POINT_VALUES, Convolutional, Yolo
+from standoff.training.darknet.layers import POINT_VALUES, Convolutional, Yolo
 from standoff.training.darknet.network import ConvolutionBlock, DarknetNetwork
 
 _OBJECT_PRIOR: Final = 0.01

@@ -16,7 +16,8 @@ import torch
 from torch import Tensor
 
 from standoff.core.errors import ModelError
-from standoff.training.darknet.cfg import POINT_VALUES, DarknetCfg, Yolo, read_cfg
+from standoff.training.darknet.cfg import DarknetCfg, read_cfg
+from standoff.training.darknet.layers import POINT_VALUES, Yolo
 from standoff.training.darknet.network import ConvolutionBlock, DarknetNetwork
 from standoff.training.darknet.shapes import weights_numbers
 from standoff.training.darknet.weights import fill_convolutions, read_numbers

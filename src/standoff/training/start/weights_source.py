@@ -12,7 +12,8 @@ from typing import Final, TypeAlias
 import numpy as np
 
 from standoff.training.architectures import yolo_fastest_xl_cfg, yolov3_cfg, yolov3_tiny_cfg
-from standoff.training.darknet.cfg import Convolutional, DarknetCfg, Yolo, parse_cfg
+from standoff.training.darknet.cfg import DarknetCfg, parse_cfg
+from standoff.training.darknet.layers import Convolutional, Yolo
 from standoff.training.darknet.shapes import layer_shapes, layer_strides, weights_numbers
 
 _Kind: TypeAlias = tuple[object, ...]
