@@ -47,9 +47,10 @@ PUBLIC_NAMES = {
         "read_data", "to_site_classes", "write_coco", "write_label_studio",
     },
     "standoff.monitor": {
-        "FanOut", "LiveQueue", "Monitor", "QueueState", "RecordKeeper", "Run", "RunRecord", "build_monitor", "open_run",
-        "warnings_of",
+        "ABOUT", "FanOut", "LiveQueue", "Monitor", "QueueState", "RecordKeeper", "Run", "RunRecord", "build_monitor",
+        "open_run", "warnings_of",
     },
+    "standoff.schemas": {"SCHEMAS"},
     "standoff.stages.detect": {
         "BOXES_OUTPUT", "CLASS_INPUT", "CROPS_INPUT", "Candidates", "DetectParams", "Letterbox", "ModelCard",
         "Network", "ONNX_ERRORS", "OnnxDetector", "PICTURE_INPUT", "POINTS_OUTPUT", "POINT_CLASSES",

@@ -24,6 +24,7 @@ from standoff.cli import (
     marker,
     quantize,
     run,
+    schema,
     simulator,
     train,
     train_points,
@@ -52,6 +53,7 @@ app.add_typer(config.app, name="config")
 app.command("demo")(demo.demo)
 app.command("bench")(bench.bench)
 app.command("doctor")(doctor.doctor)
+app.command("schema")(schema.schema)
 
 
 def _join_verbs() -> None:

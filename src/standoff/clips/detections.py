@@ -36,11 +36,11 @@ _FRAME: Final[tuple[Column, ...]] = (
 )
 _BOX: Final[tuple[Column, ...]] = (
     ("x1_px", pa.float64(), "px", "left edge of the box; null in the one row of a frame without detections"),
-    ("y1_px", pa.float64(), "px", "top edge"),
-    ("x2_px", pa.float64(), "px", "right edge"),
-    ("y2_px", pa.float64(), "px", "bottom edge"),
-    ("score", pa.float64(), "", "confidence, 0 to 1"),
-    ("class", pa.dictionary(pa.int32(), pa.string()), "", "what it is"),
+    ("y1_px", pa.float64(), "px", "top edge; null likewise"),
+    ("x2_px", pa.float64(), "px", "right edge; null likewise"),
+    ("y2_px", pa.float64(), "px", "bottom edge; null likewise"),
+    ("score", pa.float64(), "", "confidence, 0 to 1; null likewise"),
+    ("class", pa.dictionary(pa.int32(), pa.string()), "", "what it is; null likewise"),
 )
 FOOT_COLUMNS: Final[tuple[Column, ...]] = (
     (
@@ -49,16 +49,16 @@ FOOT_COLUMNS: Final[tuple[Column, ...]] = (
         "px",
         "ground point: where the middle of the footprint appears; null: the model has none",
     ),
-    ("foot_y_px", pa.float64(), "px", "the same, down the picture"),
-    ("foot_sigma_x_px", pa.float64(), "px", "standard error of foot_x_px"),
-    ("foot_sigma_y_px", pa.float64(), "px", "standard error of foot_y_px"),
-    ("foot_cov_px2", pa.float64(), "px^2", "covariance of foot_x_px and foot_y_px"),
+    ("foot_y_px", pa.float64(), "px", "the same, down the picture; null with it"),
+    ("foot_sigma_x_px", pa.float64(), "px", "standard error of foot_x_px; null with it"),
+    ("foot_sigma_y_px", pa.float64(), "px", "standard error of foot_y_px; null with it"),
+    ("foot_cov_px2", pa.float64(), "px^2", "covariance of foot_x_px and foot_y_px; null with them"),
 )
 COLUMNS: Final[tuple[Column, ...]] = (
     *FRAME_COLUMNS,
     _DETECTED,
     *_BOX,
-    ("class_id", pa.int64(), "", "number of the class in this version of standoff"),
+    ("class_id", pa.int64(), "", "number of the class in this version of standoff; null likewise"),
     *FOOT_COLUMNS,
 )
 """What is written. Readers ask by name and want `_FRAME` and `_BOX` only; there may be more columns in later files, and

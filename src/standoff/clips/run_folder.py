@@ -13,6 +13,7 @@ from standoff.clips.columns import Columns, chosen_rows, read_columns
 from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.errors import DataError
 from standoff.core.hazards import Hazard
+from standoff.core.outputs import SCHEMA_VERSION
 from standoff.files.json_text import parse_json, read_json
 from standoff.files.plain_text import read_text
 
@@ -38,14 +39,25 @@ class RunFolder:
         """Return what the run says of itself; empty where tables alone were kept.
 
         Raises:
-            DataError: There is a record, and it is broken.
+            DataError: There is a record, and it is broken, or a newer standoff wrote it.
         """
         path = self.folder / _RECORD
         record = read_json(path, "a run's record") if path.is_file() else {}
         parts = [record.get(name) or {} for name in ("source", "settings")] if isinstance(record, dict) else [None]
         if not all(isinstance(part, dict) for part in parts):
             raise DataError(expected="a run's record", found=f"something else in {path}", fix="repeat `standoff run`")
+        self._refuse_newer(record.get("schema_version", 0))
         return dict(record)
+
+    def _refuse_newer(self, version: object) -> None:
+        """Raise DataError where the files may mean something else than this version takes them for."""
+        if isinstance(version, int) and version <= SCHEMA_VERSION:
+            return
+        raise DataError(
+            expected=f"a run whose files are of version {SCHEMA_VERSION}, or older",
+            found=f"version {version} in {self.folder}",
+            fix="use the version of standoff that made the run, or a newer one",
+        )
 
     def table(self, name: RunTable, columns: Sequence[str]) -> Columns:
         """Return columns of one of the tables; what was not measured is NaN.
@@ -103,5 +115,7 @@ class RunFolder:
 
 def _event(told: Mapping[str, Any]) -> Hazard:
     known = {field.name: told[field.name] for field in fields(Hazard) if field.name in told}
-    numbers = {name: np.nan if known[name] is None else float(known[name]) for name in _UNKNOWN_NUMBERS}
+    # Earlier runs lack the probabilities, which are unknown then.
+    given = [name for name in _UNKNOWN_NUMBERS if name in known]
+    numbers = {name: np.nan if known[name] is None else float(known[name]) for name in given}
     return Hazard(**{**known, **numbers, "track_ids": tuple(known["track_ids"])})

@@ -9,6 +9,9 @@ from typing import Any, Literal
 from standoff.core.hazards import Hazard, OpenHazards
 from standoff.core.run_counts import RunCounts
 
+Status = Literal["complete", "interrupted", "failed"]
+"""How a run can end."""
+
 
 @dataclass(frozen=True, slots=True)
 class Silence:
@@ -44,7 +47,7 @@ class Outcome:
         about: What its source and stages say of themselves at the end, by heading; `warnings` among them.
     """
 
-    status: Literal["complete", "interrupted", "failed"]
+    status: Status
     message: str = ""
     hazards: tuple[Hazard, ...] = ()
     sink_errors: Mapping[str, str] = field(default_factory=dict)

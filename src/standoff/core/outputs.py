@@ -6,6 +6,9 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
+SCHEMA_VERSION: Final = 1
+"""Of the files of a run: one more where something in them goes or means something else, not where it is added."""
+
 RECORD_FILE: Final = "run.json"
 ZONES_FILE: Final = "zones.geojson"
 """The zones of the site, in its frame, where there are any."""

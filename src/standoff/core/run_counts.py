@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -15,21 +16,34 @@ from standoff.core.watched_shares import WatchedShares
 if TYPE_CHECKING:
     from standoff.core.types import FrameResult
 
-_ROWS = (
-    "frames",
-    "detected_frames",
-    "frames_with_map",
-    "detections",
-    "sure_detections",
-    "unfollowed_detections",
-    "positions",
-    "valid_positions",
-    "distances",
-    "measured_distances",
-    "filtered_distances",
-    "tracks",
-    "pairs",
+ROW_COUNTS: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "frames": "frames read",
+        "detected_frames": "frames in which the detector was asked",
+        "frames_with_map": "frames with a ground map",
+        "detections": "detections",
+        "sure_detections": "detections so sure that a track should show them",
+        "unfollowed_detections": "those of them that are in no track",
+        "positions": "rows of tracks",
+        "valid_positions": "rows of tracks that have a place on the ground",
+        "distances": "rows of pairs",
+        "measured_distances": "rows of pairs whose distance was measured",
+        "filtered_distances": "rows of pairs whose distance the outlier filter replaced",
+        "tracks": "distinct tracks",
+        "pairs": "distinct pairs",
+    }
 )
+"""What is counted once for each frame, by name, and what it counts."""
+
+TALLIES: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "hazards": "hazards by the gravest that each was",
+        "map_methods": "frames by how their map was found",
+        "no_ground_map": "frames without a map, by the reason",
+        "invalid_positions": "rows of tracks without a place, by the reason",
+    }
+)
+"""What is counted by a word."""
 
 
 class RunCounts:
@@ -44,7 +58,7 @@ class RunCounts:
     """
 
     def __init__(self) -> None:
-        self.rows: Counter[str] = Counter(dict.fromkeys(_ROWS, 0))
+        self.rows: Counter[str] = Counter(dict.fromkeys(ROW_COUNTS, 0))
         self.map_methods: Counter[str] = Counter()
         self.no_map: Counter[str] = Counter()
         self.invalid: Counter[str] = Counter()

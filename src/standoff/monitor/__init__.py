@@ -12,9 +12,10 @@ from standoff.monitor.live_queue import LiveQueue, QueueState
 from standoff.monitor.monitor import Monitor
 from standoff.monitor.opening import open_run
 from standoff.monitor.record import RecordKeeper, RunRecord
-from standoff.monitor.run import Run, warnings_of
+from standoff.monitor.run import ABOUT, Run, warnings_of
 
 __all__ = [
+    "ABOUT",
     "FanOut",
     "LiveQueue",
     "Monitor",

@@ -8,12 +8,12 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from standoff.core.errors import OutputError
-from standoff.core.outputs import RECORD_FILE
+from standoff.core.outcome import Outcome, Status
+from standoff.core.outputs import RECORD_FILE, SCHEMA_VERSION
 from standoff.core.run_counts import RunCounts
-from standoff.core.types import Outcome
 from standoff.files.in_use import FolderInUse
 from standoff.files.json_text import json_text, plain, write_json
 from standoff.files.versions import library_versions
@@ -41,7 +41,7 @@ class RunRecord:
     started_at: datetime
     versions: Mapping[str, str]
     about: Mapping[str, Any]
-    status: str = "running"
+    status: Status | Literal["running"] = "running"
     message: str = ""
     counts: RunCounts = field(default_factory=RunCounts)
     stages: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
@@ -56,7 +56,7 @@ class RunRecord:
 
     def to_dict(self) -> dict[str, Any]:
         """Return what the file says: plain values; what JSON has no word for is text, what is not finite null."""
-        head = {"status": self.status, "message": self.message}
+        head = {"status": self.status, "message": self.message, "schema_version": SCHEMA_VERSION}
         begun = {"started_at": self.started_at, "versions": self.versions, **self.about}
         if self.finished_at is None:
             return _plain({**head, **begun})

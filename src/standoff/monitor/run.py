@@ -8,7 +8,8 @@ from collections.abc import Generator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing, suppress
 from dataclasses import replace
-from typing import Any
+from types import MappingProxyType
+from typing import Any, Final
 
 from standoff.core.errors import OutputError, StandoffError
 from standoff.core.protocols import Described, Sink, Source
@@ -142,6 +143,20 @@ class Run:
             except OutputError as error:
                 _LOG.error("output record stopped: %s", error)
                 self._fan_out.errors["record"] = str(error)
+
+
+ABOUT: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "settings": "all settings of the run, defaults filled in; `standoff config show` says what each means",
+        "source": "what the film or folder of pictures is, and what could not be read of it",
+        "model": "what the detector says of itself: its file and hash among it",
+        "ground": "what the ground map rests on, and how sure it is",
+        "watched": "what was taken for granted of the detector where ground is judged",
+        "alarms": "hours of the workers in sight, alarms, and alarms for each worker and hour (null: too little seen)",
+        "warnings": "what is odd about the source, the set-up and what was seen, a clause each",
+    }
+)
+"""What a run says of its parts in its record: headings and what stands under them."""
 
 
 def describe_run(source: Source, monitor: Monitor) -> dict[str, Any]:

@@ -1,7 +1,8 @@
 """`tracks`, `proximity`, `frames` and `detections.parquet`: every number of a run, for other people's tools.
 
-A number that was not measured is null, never NaN and never a stand-in. Each column carries its unit and
-description in its Arrow field metadata. `time_to_contact_s` alone can be infinite: not approaching.
+A number that was not measured is null, never NaN and never a stand-in. Each column carries its unit and description in
+its Arrow field metadata; one whose description does not speak of null is never null. `time_to_contact_s` alone can be
+infinite: not approaching.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import pyarrow as pa
@@ -27,6 +28,7 @@ from standoff.clips import (
 )
 from standoff.core.classes import CLASSES
 from standoff.core.homography import BoolArray, FloatArray
+from standoff.core.outputs import SCHEMA_VERSION
 from standoff.core.types import FrameResult, IntArray, Outcome, TextArray, WatchedGround
 from standoff.core.watched_shares import around_tracks
 from standoff.files.json_text import plain
@@ -52,9 +54,9 @@ _TRACK_COLUMNS = (
     ("y_m", pa.float64(), "m", "site frame; null where the position is invalid"),
     ("vx_mps", pa.float64(), "m/s", "site frame; null while unknown"),
     ("vy_mps", pa.float64(), "m/s", "site frame; null while unknown"),
-    ("sigma_x_m", pa.float64(), "m", "standard error of x_m"),
-    ("sigma_y_m", pa.float64(), "m", "standard error of y_m"),
-    ("cov_xy_m2", pa.float64(), "m^2", "covariance of x_m and y_m"),
+    ("sigma_x_m", pa.float64(), "m", "standard error of x_m; null with it"),
+    ("sigma_y_m", pa.float64(), "m", "standard error of y_m; null with it"),
+    ("cov_xy_m2", pa.float64(), "m^2", "covariance of x_m and y_m; null with them"),
     ("radius_m", pa.float64(), "m", "action radius"),
     ("valid", pa.bool_(), "", "whether there is a position"),
     ("reason", pa.string(), "", "why not; empty where valid"),
@@ -132,8 +134,15 @@ class TableSink:
         self._parts.close()
 
 
+_ABOUT: Final = {
+    "standoff_version": __version__,
+    "schema_version": str(SCHEMA_VERSION),
+    "missing_values": "null: not measured",
+}
+
+
 def _schema(columns: tuple[Column, ...]) -> pa.Schema:
-    return schema_of(columns, {"standoff_version": __version__, "missing_values": "null: not measured"})
+    return schema_of(columns, _ABOUT)
 
 
 def _frame_columns(result: FrameResult, rows: int) -> dict[str, TextArray]:
