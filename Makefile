@@ -2,6 +2,7 @@
 # make test   lint, types, layer contracts and tests: the same examples on every machine
 # make test-live   the tests that need servers or take long, which make test leaves out
 # make test-processors   the numeric tests as older processors would compute; TESTS=... for others
+# make licences   of all that a runtime install brings, against an allow list; writes dist/standoff.cdx.json (CycloneDX)
 # make docs   the documentation as a site in site/; a dead link fails
 # make coverage   how much of the packages that run on site their own tests reach
 # make fuzz   the laws with many more examples, and others each time; prints how to repeat a failure
@@ -25,7 +26,7 @@ COUNTED := tests/core tests/files tests/stages tests/monitor src/standoff/core s
 DEMO_VENV := .venv-demo
 SOURCES := $(shell find src -type f -not -path '*/__pycache__/*')
 
-.PHONY: help setup test test-live test-processors coverage fuzz lint types contracts unit compiled demo demo-clean demo-pets docs bench lock clean
+.PHONY: help setup test test-live test-processors coverage fuzz lint types contracts licences unit compiled demo demo-clean demo-pets docs bench lock clean
 
 help:
 	@sed -n 's/^# make/make/p' Makefile
@@ -57,7 +58,7 @@ venv-by-apt:
 
 # Side by side what needs one core only: first of all what takes longest.
 test: $(READY)
-	@$(MAKE) --no-print-directory --jobs=2 types compiled contracts lint
+	@$(MAKE) --no-print-directory --jobs=2 types compiled contracts lint licences
 	@$(MAKE) --no-print-directory unit
 
 # Both workers would each compile all loops of a fresh clone.
@@ -84,6 +85,10 @@ types: $(READY)
 
 contracts: $(READY)
 	$(BIN)/lint-imports
+
+# Of all that a runtime install brings; shipping/licences.yaml says which are allowed, and why some are all the same.
+licences: $(READY)
+	$(BIN)/python shipping/licences.py --out dist/standoff.cdx.json
 
 # One thread a worker: two workers with two threads each get in each other's way, and sums depend on their number.
 unit: $(READY)
