@@ -3,6 +3,7 @@
 # make test-live   the tests that need servers or take long, which make test leaves out
 # make test-processors   the numeric tests as older processors would compute; TESTS=... for others
 # make licences   of all that a runtime install brings, against an allow list; writes dist/standoff.cdx.json (CycloneDX)
+# make bundle   a folder in dist/ that installs without a network: wheels for this platform, detector, docs; EXTRAS=scale for more
 # make docs   the documentation as a site in site/; a dead link fails
 # make coverage   how much of the packages that run on site their own tests reach
 # make fuzz   the laws with many more examples, and others each time; prints how to repeat a failure
@@ -26,7 +27,7 @@ COUNTED := tests/core tests/files tests/stages tests/monitor src/standoff/core s
 DEMO_VENV := .venv-demo
 SOURCES := $(shell find src -type f -not -path '*/__pycache__/*')
 
-.PHONY: help setup test test-live test-processors coverage fuzz lint types contracts licences unit compiled demo demo-clean demo-pets docs bench lock clean
+.PHONY: help setup test test-live test-processors coverage fuzz lint types contracts licences bundle unit compiled demo demo-clean demo-pets docs bench lock clean
 
 help:
 	@sed -n 's/^# make/make/p' Makefile
@@ -101,6 +102,10 @@ coverage: $(READY)
 
 bench: $(READY)
 	$(BIN)/python -m pytest benchmarks -p no:xdist --benchmark-only --benchmark-columns=median,iqr,rounds
+
+# The simulator is in it; what trains is not.
+bundle: $(READY)
+	$(BIN)/python shipping/bundle.py --extras "$(EXTRAS)"
 
 docs: $(READY)
 	$(BIN)/mkdocs build --strict

@@ -9,8 +9,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "shipping"))
 from installed import Part, parts_of
 from licences import ROOTS, Rules, sbom
 

@@ -114,8 +114,8 @@ class RunFolder:
 
 
 def _event(told: Mapping[str, Any]) -> Hazard:
-    known: dict[str, Any] = {field.name: told[field.name] for field in fields(Hazard) if field.name in told}
+    known = {field.name: told[field.name] for field in fields(Hazard) if field.name in told}
     # Earlier runs lack the probabilities, which are unknown then.
     given = [name for name in _UNKNOWN_NUMBERS if name in known]
-    numbers = {name: np.nan if known[name] is None else float(known[name]) for name in given}
+    numbers: dict[str, Any] = {name: np.nan if known[name] is None else float(known[name]) for name in given}
     return Hazard(**{**known, **numbers, "track_ids": tuple(known["track_ids"])})
