@@ -7,6 +7,8 @@ from types import MappingProxyType
 from typing import Final
 
 RECORD_FILE: Final = "run.json"
+ASSISTANCE: Final = "Assistance only: no certified safety function, no replacement for a banksman or an exclusion zone"
+"""Stands on whatever people read."""
 ZONES_FILE: Final = "zones.geojson"
 """The zones of the site, in its frame, where there are any."""
 
