@@ -50,6 +50,10 @@ PUBLIC_NAMES = {
         "FanOut", "LiveQueue", "Monitor", "QueueState", "RecordKeeper", "Run", "RunRecord", "build_monitor", "open_run",
         "warnings_of",
     },
+    "standoff.scale": {
+        "FilmPlan", "FilmResult", "Findings", "Moment", "find_films", "plan_films", "watch_films", "write_moments",
+        "write_overview", "write_tables",
+    },
     "standoff.stages.detect": {
         "BOXES_OUTPUT", "CLASS_INPUT", "CROPS_INPUT", "Candidates", "DetectParams", "Letterbox", "ModelCard",
         "Network", "ONNX_ERRORS", "OnnxDetector", "PICTURE_INPUT", "POINTS_OUTPUT", "POINT_CLASSES",
