@@ -47,7 +47,7 @@ setup: $(READY)
 # bring a second OpenCV that overwrites the headless one.
 $(READY): pyproject.toml simulator/pyproject.toml requirements.lock requirements-oracles.txt
 	$(call empty_venv,$(VENV))
-	$(BIN)/python -m pip install --quiet --constraint requirements.lock --editable '.[dev,train]' --editable ./simulator
+	$(BIN)/python -m pip install --quiet --constraint requirements.lock --editable '.[dev,scale,train]' --editable ./simulator
 	$(BIN)/python -m pip install --quiet --no-deps --requirement requirements-oracles.txt
 	@touch $@
 

@@ -237,3 +237,6 @@ GOLDEN_REL = 0.01
 
 GOLDEN_SHARE = 0.99
 """Of the numbers of a column that must agree: a track may change its box in another frame by one."""
+
+TOLD_IN_DEGREES_M = 0.01
+"""Seven digits of a degree: half of 1.1 cm; and a plane that touches some metres further north."""

@@ -28,7 +28,7 @@ PUBLIC_NAMES = {
     "standoff.config": {
         "GroundSettings", "MarkerSettings", "ReferenceSettings", "Replacement", "STAGE_NAMES", "Settings",
         "SiteSettings", "StreamSettings", "build_ground", "build_marker_observer", "build_replacement", "build_stage",
-        "build_watcher", "build_zones", "import_factory", "load_settings", "load_site", "read_params",
+        "build_watcher", "build_zones", "import_factory", "load_settings", "load_site", "named_files", "read_params",
         "read_settings_file", "recorded_settings", "resolved",
     },
     "standoff.evaluation.coverage": {
@@ -50,13 +50,17 @@ PUBLIC_NAMES = {
         "ABOUT", "FanOut", "LiveQueue", "Monitor", "QueueState", "RecordKeeper", "Run", "RunRecord", "build_monitor",
         "open_run", "warnings_of",
     },
+    "standoff.scale": {
+        "FilmPlan", "FilmResult", "Findings", "Moment", "find_films", "plan_films", "watch_films", "write_moments",
+        "write_overview", "write_tables",
+    },
     "standoff.schemas": {"SCHEMAS"},
     "standoff.stages.detect": {
         "BOXES_OUTPUT", "CLASS_INPUT", "CROPS_INPUT", "Candidates", "DetectParams", "Letterbox", "ModelCard",
         "Network", "ONNX_ERRORS", "OnnxDetector", "PICTURE_INPUT", "POINTS_OUTPUT", "POINT_CLASSES",
         "POINT_CROP_AROUND", "POINT_CROP_PX", "Provider", "RecordedDetector", "SHIPPED_MODELS", "SharedDetector",
-        "ShippedModel", "available_providers", "detections_in_rows", "find_model", "open_session", "point_crop",
-        "point_metadata", "point_squares_px", "resize",
+        "ShippedModel", "available_providers", "detections_in_rows", "find_ground_points", "find_model",
+        "open_session", "point_crop", "point_metadata", "point_squares_px", "resize",
     },
     "standoff.stages.frames": {
         "ArrayPicture", "AvPicture", "FileSource", "Scaler", "SourceParams", "frame_from_array", "local_path",

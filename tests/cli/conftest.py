@@ -33,19 +33,24 @@ def call(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) ->
 
 @pytest.fixture
 def site(tmp_path: Path) -> Path:
-    """Settings with a scripted detector and a survey in which twenty pixels are a metre."""
+    return write_site(tmp_path)
+
+
+def write_site(folder: Path, **more: object) -> Path:
+    """Write settings with a scripted detector and a survey in which twenty pixels are a metre."""
     survey = {
         "image_size_px": [320, 240],
         "points": [
             {"name": f"{x},{y}", "px": [x, y], "m": [x / 20, (240 - y) / 20]} for x in (10, 300) for y in (60, 230)
         ],
     }
-    (tmp_path / "survey.yaml").write_text(yaml.safe_dump(survey), encoding="utf-8")
+    (folder / "survey.yaml").write_text(yaml.safe_dump(survey), encoding="utf-8")
     settings = {
         "ground": {"survey": "survey.yaml"},
         "replace": {"detect": {"factory": "cli.test_cli:Approach"}},
         "locate": {"radius_m": {"worker": 1.0, "excavator": 3.0}},
+        **more,
     }
-    path = tmp_path / "site.yaml"
+    path = folder / "site.yaml"
     path.write_text(yaml.safe_dump(settings), encoding="utf-8")
     return path

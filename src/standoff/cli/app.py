@@ -11,6 +11,7 @@ import typer
 
 from standoff import __version__
 from standoff.cli import (
+    batch,
     bench,
     blend,
     calibrate,
@@ -39,6 +40,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.command("run")(run.run)
+app.command("batch")(batch.batch)
 app.command("train")(train.train)
 app.command("train-points")(train_points.train_points)
 app.command("blend")(blend.blend)

@@ -13,7 +13,7 @@ from standoff.config.build import (
     build_zones,
     import_factory,
 )
-from standoff.config.load import load_settings, read_settings_file, recorded_settings, resolved
+from standoff.config.load import load_settings, named_files, read_settings_file, recorded_settings, resolved
 from standoff.config.markers import MarkerSettings
 from standoff.config.params import read_params
 from standoff.config.settings import (
@@ -43,6 +43,7 @@ __all__ = [
     "import_factory",
     "load_settings",
     "load_site",
+    "named_files",
     "read_params",
     "read_settings_file",
     "recorded_settings",

@@ -13,10 +13,11 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 from pydantic_settings import BaseSettings, InitSettingsSource, PydanticBaseSettingsSource
 
+from standoff.clips import DETECTIONS_FILE
 from standoff.config.settings import Settings
 from standoff.core.errors import ConfigError
 from standoff.files.yaml_text import read_yaml
-from standoff.stages.detect import SHIPPED_MODELS
+from standoff.stages.detect import SHIPPED_MODELS, find_ground_points, find_model
 
 
 def _clause(error: ErrorDetails) -> str:
@@ -172,9 +173,11 @@ def settings_from(from_file: Mapping[str, Any], origin: str, overrides: Mapping[
             return init_settings, env_settings, InitSettingsSource(settings_cls, dict(from_file))
 
     try:
-        return _FileSettings(**from_caller)
+        made = _FileSettings(**from_caller)
     except ValidationError as error:
         raise config_error(origin, error) from error
+    # Of the class itself: one that is made in a function cannot be pickled, and goes to no other process.
+    return Settings.model_construct(made.model_fields_set, **dict(made))
 
 
 def recorded_settings(record: Mapping[str, Any], run: str) -> Settings:
@@ -193,6 +196,25 @@ def recorded_settings(record: Mapping[str, Any], run: str) -> Settings:
             expected=f"the settings of the run in {run}", found="none", fix="give the folder that `standoff run` wrote"
         )
     return settings_from({}, f"the record of {run}", settings)
+
+
+def named_files(settings: Settings) -> dict[str, Path]:
+    """Return the files that a run with these settings reads beside its source, by the setting that names them.
+
+    Detectors and recordings of a replacement, and what its code is, nobody here knows.
+
+    Raises:
+        ModelError: standoff was installed without a detector of its own.
+    """
+    ground, zones = settings.ground, settings.zones
+    found = {"zones": zones, "ground.survey": ground.survey, "ground.camera": ground.camera}
+    if settings.detections is not None:
+        is_run = settings.detections.is_dir()
+        found["detections"] = settings.detections / DETECTIONS_FILE if is_run else settings.detections
+    elif "detect" not in settings.replace:
+        found["model"] = find_model(settings.model)
+        found["detect.ground_points"] = find_ground_points(settings.detect.ground_points)
+    return {name: Path(path) for name, path in found.items() if path is not None}
 
 
 def resolved(settings: Settings) -> dict[str, Any]:

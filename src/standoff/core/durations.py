@@ -1,7 +1,8 @@
-"""Whether something has lasted long enough: times of frames are sums and differences of rounded numbers.
+"""Whether something has lasted long enough, and how times are said.
 
-A fifth of a second after 0.4 s is 0.6000000000000001 s, or 0.19999999999999996 s later: compared to the letter, every
-other frame of a film at five frames a second would be too early.
+Times of frames are sums and differences of rounded numbers. A fifth of a second after 0.4 s is 0.6000000000000001 s, or
+0.19999999999999996 s later: compared to the letter, every other frame of a film at five frames a second would be too
+early.
 """
 
 from __future__ import annotations
@@ -42,3 +43,15 @@ def is_apart(before_s: float, time_s: float, longest_s: float) -> bool:
     (False, True)
     """
     return time_s - before_s > longest_s + ROUNDING_S
+
+
+def minutes_text(time_s: float, _position: object = None) -> str:
+    """Return minutes and seconds, for a table, or the tick of an axis.
+
+    >>> minutes_text(75.25), minutes_text(float("nan"))
+    ('1:15.2', 'unknown')
+    """
+    if not np.isfinite(time_s):
+        return "unknown"
+    minutes, seconds = divmod(round(time_s, 1), 60.0)
+    return f"{int(minutes)}:{seconds:04.1f}"

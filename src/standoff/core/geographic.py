@@ -56,11 +56,22 @@ class GeographicOrigin:
         offset_deg = lonlat_deg - np.array([self.longitude_deg, self.latitude_deg])
         # A site on the antimeridian is one site.
         offset_deg[:, 0] = (offset_deg[:, 0] + 180.0) % 360.0 - 180.0
+        places_m: FloatArray = np.deg2rad(offset_deg) * self._metres_a_radian()
+        return places_m
+
+    def to_lonlat(self, places_m: FloatArray) -> FloatArray:
+        """Turn metres (N, 2) east and north of the origin into longitudes and latitudes (N, 2), as exactly."""
+        lonlat_deg: FloatArray = np.rad2deg(places_m / self._metres_a_radian())
+        lonlat_deg += np.array([self.longitude_deg, self.latitude_deg])
+        lonlat_deg[:, 0] = (lonlat_deg[:, 0] + 180.0) % 360.0 - 180.0
+        return lonlat_deg
+
+    def _metres_a_radian(self) -> FloatArray:
+        """Return how many metres a radian of longitude and one of latitude are, where the plane touches."""
         latitude = np.deg2rad(self.middle_latitude_deg)
         w = np.sqrt(1.0 - _ECCENTRICITY_2 * np.sin(latitude) ** 2)
         across_m, along_m = _SEMI_MAJOR_M / w, _SEMI_MAJOR_M * (1.0 - _ECCENTRICITY_2) / w**3
-        places_m: FloatArray = np.deg2rad(offset_deg) * np.array([across_m * np.cos(latitude), along_m])
-        return places_m
+        return np.array([across_m * np.cos(latitude), along_m])
 
 
 def east_north_m(lonlat_deg: FloatArray) -> FloatArray:

@@ -10,6 +10,8 @@ SCHEMA_VERSION: Final = 1
 """Of the files of a run: one more where something in them goes or means something else, not where it is added."""
 
 RECORD_FILE: Final = "run.json"
+ASSISTANCE: Final = "Assistance only: no certified safety function, no replacement for a banksman or an exclusion zone"
+"""Stands on whatever people read."""
 ZONES_FILE: Final = "zones.geojson"
 """The zones of the site, in its frame, where there are any."""
 

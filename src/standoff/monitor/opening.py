@@ -7,11 +7,12 @@ from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 
-from standoff.config import Settings, build_replacement, build_zones, resolved
+from standoff.config import Settings, build_replacement, build_zones, named_files, resolved
 from standoff.core.errors import OutputError
 from standoff.core.outputs import RUN_FILES, ZONES_FILE
 from standoff.core.protocols import Sink
 from standoff.core.types import Outcome
+from standoff.files.fingerprint import digests
 from standoff.files.zone_file import write_zones
 from standoff.monitor.build import build_monitor
 from standoff.monitor.record import RecordKeeper
@@ -72,7 +73,7 @@ def open_run(
         checked=checked,
     )
     # The record first, so that a folder without room is told before anything else is begun.
-    about = {"settings": resolved(settings), **describe_run(frames, monitor)}
+    about = {"settings": resolved(settings), "files": digests(named_files(settings)), **describe_run(frames, monitor)}
     folder = RecordKeeper(prepare_output(out, overwrite=overwrite), about)
     own = _begin_outputs(folder, settings.outputs, wanted)
     return Run(frames, monitor, {**(more_sinks or {}), **own, **extra}, folder, overlaps=overlaps)

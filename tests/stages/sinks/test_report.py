@@ -11,10 +11,10 @@ import pytest
 from pages import PageReader, without_pictures
 from stages.sinks.fake_site import COMPLETE, FakeSite, ended, quiet
 
+from standoff.core.durations import minutes_text
 from standoff.core.lengths import METRES
 from standoff.core.types import FrameResult, Hazard, NoGroundMap, Outcome
 from standoff.stages.sinks import ReportParams, ReportSink
-from standoff.stages.sinks.charts import clock
 from standoff.stages.sinks.collect import RunSummary
 
 SITE = (320, 180)
@@ -202,4 +202,4 @@ def test_a_worst_moment_shows_its_pair(results: list[FrameResult]) -> None:
     ("time_s", "text"), [(0.0, "0:00.0"), (59.96, "1:00.0"), (3600.0, "60:00.0"), (NAN, "unknown")]
 )
 def test_a_clock_time_rounds_over_the_minute(time_s: float, text: str) -> None:
-    assert clock(time_s) == text
+    assert minutes_text(time_s) == text

@@ -23,7 +23,7 @@ from standoff.stages.detect.point_network import CLASS_INPUT, CROPS_INPUT, point
 from standoff.stages.detect.recorded import RecordedDetector
 from standoff.stages.detect.runtime import ONNX_ERRORS, available_providers, open_session
 from standoff.stages.detect.shared import SharedDetector
-from standoff.stages.detect.shipped import SHIPPED_MODELS, ShippedModel, find_model
+from standoff.stages.detect.shipped import SHIPPED_MODELS, ShippedModel, find_ground_points, find_model
 
 __all__ = [
     "BOXES_OUTPUT",
@@ -48,6 +48,7 @@ __all__ = [
     "ShippedModel",
     "available_providers",
     "detections_in_rows",
+    "find_ground_points",
     "find_model",
     "open_session",
     "point_crop",

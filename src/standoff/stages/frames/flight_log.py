@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 import re
 from dataclasses import dataclass, replace
@@ -174,6 +175,7 @@ class FlightLog:
             "blocks": len(self.time_s),
             "from_s": float(self.time_s[0]),
             "to_s": self.end_s,
+            "sha256": hashlib.sha256(self.time_s.tobytes() + self.values.tobytes()).hexdigest(),
             "readings": [name for name in READINGS if np.isfinite(self.column(name)).any()],
         }
 

@@ -9,6 +9,7 @@ from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Outline
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
+from standoff.core.durations import minutes_text
 from standoff.core.homography import FloatArray
 from standoff.core.types import ImageArray
 from standoff.core.zones import Zone, ZoneKind, ring_middle
@@ -25,20 +26,6 @@ _PANELS = 6
 _PLAN_PX = 520
 _HATCH: dict[ZoneKind, str] = {"no_go": "///", "machine_only": "...", "crossing": "---"}
 _FIRST, _ON, _LAST = Outline.MOVETO, Outline.LINETO, Outline.CLOSEPOLY
-
-
-def clock(time_s: float, _position: object = None) -> str:
-    """Return minutes and seconds for an axis or a table.
-
-    >>> clock(75.25)
-    '1:15.2'
-    >>> clock(float("nan"))
-    'unknown'
-    """
-    if not np.isfinite(time_s):
-        return "unknown"
-    minutes, seconds = divmod(round(time_s, 1), 60.0)
-    return f"{int(minutes)}:{seconds:04.1f}"
 
 
 def site_chart(summary: RunSummary, warning_gap_m: float) -> str:
@@ -140,7 +127,7 @@ def _plot_by_limit(axes: Axes, series: Series, column: str, danger_m: float, war
 def _finish_time_axis(axes: Axes, summary: RunSummary) -> None:
     span_s = max(summary.last_s - summary.first_s, 1e-3)
     axes.set_xlim(summary.first_s, summary.first_s + span_s)
-    axes.xaxis.set_major_formatter(FuncFormatter(clock))
+    axes.xaxis.set_major_formatter(FuncFormatter(minutes_text))
     axes.xaxis.set_major_locator(MaxNLocator(8, steps=[1, 2, 3, 6, 10]))
     axes.grid(True, axis="y")
 

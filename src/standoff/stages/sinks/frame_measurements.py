@@ -31,9 +31,6 @@ _WORTH_SAYING = 0.05
 _MOST_REASONS = 2
 
 
-ASSISTANCE = "Assistance only: no certified safety function, no replacement for a banksman or an exclusion zone"
-
-
 @dataclass(frozen=True, slots=True)
 class FrameMeasurements:
     """One frame's measurements.

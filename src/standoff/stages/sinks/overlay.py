@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from standoff.core.homography import FloatArray
+from standoff.core.outputs import ASSISTANCE
 from standoff.core.types import GroundMap, ImageArray
 from standoff.core.zones import NOT_PLACED
 from standoff.drawing.ground_shapes import circle_outlines_px, outlines_in_sight_px
@@ -14,7 +15,6 @@ from standoff.drawing.painter import Painter
 from standoff.drawing.palette import Tone, bgr
 from standoff.drawing.text import TextSprites
 from standoff.stages.sinks.fans import FAN_OPACITY
-from standoff.stages.sinks.frame_measurements import ASSISTANCE
 from standoff.stages.sinks.params import DrawParams
 from standoff.stages.sinks.shade import PictureShade
 from standoff.stages.sinks.sketch import Sketch

@@ -15,12 +15,13 @@ import jinja2
 from markupsafe import Markup
 
 from standoff import __version__
+from standoff.core.durations import minutes_text
+from standoff.core.outputs import ASSISTANCE
 from standoff.core.types import FrameResult, Outcome
 from standoff.core.zones import NOT_PLACED, ZONE_WORDS, Zone
 from standoff.files.json_text import plain
 from standoff.files.whole import partial_file
 from standoff.stages.sinks.collect import HazardLife, RunSummary
-from standoff.stages.sinks.frame_measurements import ASSISTANCE
 from standoff.stages.sinks.params import ReportParams, ShowParams
 
 _MOST_ROWS = 200
@@ -73,11 +74,11 @@ class ReportSink:
 def render(summary: RunSummary, outcome: Outcome, warning_gap_m: float, checked: str) -> str:
     """Return the page."""
     # matplotlib takes long to load; a run starts without it, and whoever imports another sink does not need it
-    from standoff.stages.sinks.charts import clock, pair_charts, plan_chart, site_chart, watched_chart
+    from standoff.stages.sinks.charts import pair_charts, plan_chart, site_chart, watched_chart
 
     folder = files("standoff.stages.sinks")
     environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True)
-    environment.filters.update(clock=clock, percent=_percent, length=summary.unit.length, said=summary.unit.said)
+    environment.filters.update(clock=minutes_text, percent=_percent, length=summary.unit.length, said=summary.unit.said)
     template = environment.from_string((folder / "report.html.j2").read_text(encoding="utf-8"))
     about, counts = outcome.about, outcome.counts
     has_frames = counts.rows["frames"] > 0

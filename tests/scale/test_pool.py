@@ -1,0 +1,129 @@
+"""What becomes of films whose processes die, told by a Ray that follows a script."""
+
+from __future__ import annotations
+
+import socket
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pytest
+import ray.exceptions
+
+from standoff.config import Settings
+from standoff.core.errors import ConfigError
+from standoff.scale import FilmPlan, FilmResult, pool, watch_films
+
+Act = Callable[[FilmPlan], FilmResult]
+ERRORS: Any = ray.exceptions
+
+
+def complete(plan: FilmPlan) -> FilmResult:
+    return FilmResult(plan.film, plan.out, "complete")
+
+
+@dataclass
+class ScriptedRay:
+    """A Ray in which each film ends as a script says; films are done in the order in which they were begun.
+
+    Args:
+        script: By the film's name; the others are complete.
+        cores: Of each machine.
+    """
+
+    script: dict[str, Act] = field(default_factory=dict)
+    cores: Sequence[int] = (2,)
+    most_waiting: int = 0
+    options_given: dict[str, Any] = field(default_factory=dict)
+    exceptions = ERRORS
+
+    def remote(self, *words: Any) -> Any:
+        """Both a function made remote, as Ray does it, and the call of one."""
+        return words[0] if len(words) == 2 else self
+
+    def options(self, **options: Any) -> ScriptedRay:
+        self.options_given = options
+        return self
+
+    def nodes(self) -> list[dict[str, Any]]:
+        return [{"Alive": True, "Resources": {"CPU": float(cores)}} for cores in self.cores]
+
+    def wait(self, waiting: list[FilmPlan], num_returns: int, timeout: float) -> tuple[list[FilmPlan], list[FilmPlan]]:
+        self.most_waiting = max(self.most_waiting, len(waiting))
+        return (waiting[:num_returns], waiting[num_returns:]) if self.cores else ([], waiting)
+
+    def get(self, plan: FilmPlan) -> FilmResult:
+        return self.script.get(plan.film.stem, complete)(plan)
+
+
+def plans(count: int) -> Iterator[FilmPlan]:
+    for number in range(count):
+        yield Plan(Path(f"{number}.mp4"), Path(f"out/{number}"), Settings(), {})
+
+
+class Plan(FilmPlan):
+    """A plan that can be a key, as Ray's references are."""
+
+    def __hash__(self) -> int:
+        return hash(self.film)
+
+
+def watched(scripted: ScriptedRay, count: int, cores_per_film: int = 2) -> dict[str, FilmResult]:
+    results = pool.Machines(scripted, cores_per_film).watch(plans(count))
+    return {one.film.stem: one for one in results}
+
+
+def lost(plan: FilmPlan) -> FilmResult:
+    raise ERRORS.WorkerCrashedError
+
+
+def faulty(plan: FilmPlan) -> FilmResult:
+    raise ERRORS.RayTaskError("watch", "many\nlines", ZeroDivisionError("in a stage\nof mine"))
+
+
+def test_a_film_that_kills_its_process_or_meets_a_fault_is_named_and_the_others_go_on() -> None:
+    results = watched(ScriptedRay({"1": lost, "3": faulty}), 5)
+    assert {name: one.status for name, one in results.items()} == {
+        "0": "complete", "1": "failed", "2": "complete", "3": "failed", "4": "complete",
+    }  # fmt: skip
+    assert results["1"].message.startswith("its process was lost 4 times: ")
+    assert results["3"].message == "ZeroDivisionError: in a stage of mine"
+
+
+@pytest.mark.parametrize(
+    ("cores", "per_film", "places"), [((2,), 2, 1), ((8, 4), 2, 6), ((1, 1), 4, 2), ((5, 0), 3, 1)]
+)
+def test_only_a_few_films_wait_for_each_that_is_watched(cores: tuple[int, ...], per_film: int, places: int) -> None:
+    scripted = ScriptedRay(cores=cores)
+    assert len(watched(scripted, 50, per_film)) == 50
+    assert scripted.most_waiting == 2 * places
+    assert scripted.options_given["num_cpus"] == min(per_film, max(cores))
+
+
+def test_films_left_without_a_machine_fail_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pool, "_NO_MACHINE_S", 0.0)
+    monkeypatch.setattr(pool, "_LOOKS_EVERY_S", 0.0)
+    scripted = ScriptedRay(cores=(2,))
+    machines = pool.Machines(scripted, 2)
+    results = machines.watch(plans(3))
+    assert next(results).status == "complete"
+    scripted.cores = ()
+    assert [(one.status, one.message) for one in results] == [
+        ("failed", "no machine of the cluster has 2 cores any more")
+    ] * 2
+
+
+def test_a_cluster_without_cores_is_refused() -> None:
+    with pytest.raises(ConfigError, match="machines that have cores"):
+        pool.Machines(ScriptedRay(cores=(0,)), 2)
+
+
+def test_a_port_at_which_nobody_speaks_rays_language_is_given_up_in_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pool, "ANSWERS_WITHIN_S", 1.0)
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        begun_s = time.monotonic()
+        with pytest.raises(ConfigError, match="expected a Ray cluster at ray"):
+            next(iter(watch_films([], f"ray://127.0.0.1:{silent.getsockname()[1]}")))
+        assert time.monotonic() - begun_s < 3.0
