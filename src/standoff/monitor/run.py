@@ -148,6 +148,7 @@ class Run:
 ABOUT: Final[Mapping[str, str]] = MappingProxyType(
     {
         "settings": "all settings of the run, defaults filled in; `standoff config show` says what each means",
+        "files": "SHA-256 of each file that the settings name, by the setting",
         "source": "what the film or folder of pictures is, and what could not be read of it",
         "model": "what the detector says of itself: its file and hash among it",
         "ground": "what the ground map rests on, and how sure it is",
