@@ -132,6 +132,9 @@ def dataset(
         Path | None, typer.Option(help="Folder of COLLADA or glTF parts for some of the excavators.")
     ] = None,
     mesh_share: Annotated[float, typer.Option(min=0, max=1, help="Of the scenes whose excavators these are.")] = 1 / 3,
+    cast: Annotated[
+        Literal["random", "excavators"], typer.Option(help="Who is there: anybody, or excavators with some people.")
+    ] = "random",
     processes: _Processes = 2,
     overwrite: _Overwrite = False,
     quiet: _Quiet = False,
@@ -143,7 +146,7 @@ def dataset(
     width_px, height_px = size_or_none(size)
     plan = DatasetPlan(
         images=images, per_scene=per_scene, width_px=width_px or 0, height_px=height_px or 0, layout=layout,
-        held_out=held_out, seed=seed, excavator_mesh=excavator_mesh, mesh_share=mesh_share,
+        held_out=held_out, seed=seed, excavator_mesh=excavator_mesh, mesh_share=mesh_share, cast=cast,
     )  # fmt: skip
     with progress("rendering", images, quiet=quiet, unit="pictures") as step:
         record_dataset(plan, out, overwrite=overwrite, processes=processes, on_picture=step)

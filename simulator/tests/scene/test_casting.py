@@ -57,6 +57,14 @@ def test_a_crowd_has_the_workers_and_machines_that_are_wanted(workers: int, mach
 
 
 @pytest.mark.parametrize("seed", seeds(3))
+def test_all_machines_among_excavators_are_excavators_and_there_are_several(seed: int) -> None:
+    cast = _cast("excavators", seed)
+    machines = [actor.model for actor in cast.actors if not is_person(actor.model)]
+    assert {model.class_id for model in machines} == {CLASS_BY_NAME["excavator"].id}
+    assert 2 <= len(machines) < len(cast.actors)
+
+
+@pytest.mark.parametrize("seed", seeds(3))
 def test_nobody_who_is_added_alone_comes_into_the_way_of_others(seed: int) -> None:
     rng = np.random.default_rng(seed)
     cast, added = Cast(), []

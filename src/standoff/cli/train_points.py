@@ -27,7 +27,13 @@ def train_points(
             "counts, which may be as good. [default: all]"
         ),
     ] = None,
-    steps: Annotated[int, typer.Option(min=1, help="Batches of 64 boxes.")] = 7000,
+    weights: Annotated[
+        str,
+        typer.Option(
+            help="Detector whose first layers it starts with: site, or an exported efficientnet-lite0."
+        ),
+    ] = "site",
+    steps: Annotated[int, typer.Option(min=1, help="Batches of 64 boxes.")] = 3000,
     seed: Annotated[int, typer.Option(min=0, help="Of everything random.")] = 0,
     workers: Annotated[int, typer.Option(min=0, help="Processes that draw boxes; 0: none beside.")] = 1,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress bar.")] = False,
@@ -39,21 +45,29 @@ def train_points(
     from standoff.cli.console import print_table, progress
     from standoff.core.errors import ConfigError
     from standoff.labels import read_data
-    from standoff.stages.detect import POINT_CLASSES
-    from standoff.training.ground_point import PointTraining, measure_points, read_patches, train_points, write_points
+    from standoff.stages.detect import POINT_CLASSES, find_model
+    from standoff.training.ground_point import (
+        PointTraining,
+        measure_points,
+        read_eyes,
+        read_patches,
+        train_points,
+        write_points,
+    )
 
     unknown = sorted(set(only or ()) - set(POINT_CLASSES))
     if unknown:
         raise ConfigError(
             expected=f"--only with one of {', '.join(POINT_CLASSES)}", found=", ".join(unknown), fix="correct the name"
         )
+    eyes = read_eyes(find_model(weights))
     labelled = read_data(data)
     learn, hold = (labelled.splits[split] for split in ("train", "val"))
     with progress("reading", len(learn) + len(hold), quiet=quiet, unit="pictures") as on_picture:
         patches, held = (read_patches(pictures, labelled.classes, on_picture) for pictures in (learn, hold))
     plan = PointTraining(steps=steps, seed=seed, workers=workers)
     with progress(f"training on {len(patches)} boxes", steps, quiet=quiet, unit="steps") as on_step:
-        network = train_points(patches, plan, on_step)
+        network = train_points(patches, eyes, plan, on_step)
     errors = measure_points(network, held)
     write_points(network, errors, out, {"boxes": len(patches), "steps": steps, "seed": seed}, only or ())
     title = f"Ground points of {len(held)} boxes that were not learnt from"

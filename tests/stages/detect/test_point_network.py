@@ -12,7 +12,7 @@ from square_detector import draw_squares, write_detector
 
 from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.errors import ModelError
-from standoff.stages.detect import DetectParams, OnnxDetector
+from standoff.stages.detect import DetectParams, OnnxDetector, find_model
 from standoff.stages.detect.point_crops import POINT_CLASSES, POINT_CROP_AROUND
 from standoff.stages.detect.point_network import TELLS_KEY, PointNetwork
 from standoff.stages.frames import frame_from_array
@@ -26,10 +26,10 @@ STRETCH = 2.0
 @pytest.fixture(scope="module")
 def points_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A network that says one place of the square for each class, whatever it sees."""
-    from standoff.training.ground_point import PointError, write_points
+    from standoff.training.ground_point import PointError, read_eyes, write_points
     from standoff.training.ground_point.network import GroundPointNetwork
 
-    network = GroundPointNetwork().eval()
+    network = GroundPointNetwork(read_eyes(find_model("site"))).eval()
     for parameter in [*network.map[-1].parameters(), *network.sigma[-1].parameters()]:
         torch.nn.init.zeros_(parameter)
     network.begin_at(torch.tensor(PLACES, dtype=torch.float32))

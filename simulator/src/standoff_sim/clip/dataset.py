@@ -48,6 +48,7 @@ class DatasetPlan:
         seed: Of everything random.
         excavator_mesh: Folder of mesh parts for some of the excavators, or None.
         mesh_share: Of the scenes whose excavators are made of them.
+        cast: Who is there: `random`, few or many of all kinds, or `excavators`, with some people.
 
     Raises:
         ConfigError: A size or seed out of range.
@@ -62,6 +63,7 @@ class DatasetPlan:
     seed: int
     excavator_mesh: Path | None = None
     mesh_share: float = 1 / 3
+    cast: Literal["random", "excavators"] = "random"
 
     def __post_init__(self) -> None:
         check_seed(self.seed)
@@ -146,7 +148,7 @@ def _draw_plan(rng: np.random.Generator, plan: DatasetPlan) -> Plan:
     conditions = get_args(Condition)
     preset = Preset(
         "one scene of a data set",
-        "random",
+        plan.cast,
         width_px=plan.width_px,
         height_px=plan.height_px,
         frames=_SCENE_FRAMES,

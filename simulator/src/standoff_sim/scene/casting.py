@@ -26,6 +26,7 @@ from standoff_sim.scene.ordinary import ordinary_site
 from standoff_sim.scene.scene import Model, Motion
 
 _TRIES = 12
+_EXCAVATOR_TRIES = 14
 _BUSY_WORKERS, _BUSY_MACHINES = 8, 5
 _BREACH_M, _NEAR_MISS_M = 5.6, 8.4
 """Distances of worker and wheel loader, whose circles touch at 7.8 m."""
@@ -226,6 +227,19 @@ def _any_number(rng: np.random.Generator, area: FilmedArea) -> Cast:
     )
 
 
+def _excavators(rng: np.random.Generator, area: FilmedArea) -> Cast:
+    """Excavators in every stance, with some people: what a network of ground points is to learn most."""
+    cast, lasting_s = Cast(), area.duration_s
+    cast.reserved += area.reserved()
+    scripts = behaviour.digging, behaviour.grading, behaviour.idle
+    for _ in range(_EXCAVATOR_TRIES):
+        excavator, script = area.excavator(rng), scripts[int(rng.integers(len(scripts)))]
+        cast.add([excavator], [script(rng, excavator, _spot(rng, area), lasting_s)])
+    for _ in range(int(rng.integers(1, 9))):
+        cast.add(*_people_activity(rng, area, 2, cast))
+    return cast
+
+
 CASTS: Mapping[str, Callable[[np.random.Generator, FilmedArea], Cast]] = MappingProxyType(
     {
         "mobile": _mobile,
@@ -234,6 +248,7 @@ CASTS: Mapping[str, Callable[[np.random.Generator, FilmedArea], Cast]] = Mapping
         "stationary-20": partial(_stationary, distance_m=20.0),
         "board": _nobody,
         "random": _any_number,
+        "excavators": _excavators,
         "ordinary": ordinary_site,
         "busy": partial(crowd, workers=_BUSY_WORKERS, machines=_BUSY_MACHINES),
     }

@@ -47,6 +47,15 @@ def _backbone(cfg: CfgComposer) -> list[int]:
     return ends
 
 
+def stage_layers() -> tuple[int, ...]:
+    """Return the last layer of each stage, by its place in the cfg.
+
+    >>> stage_layers()
+    (2, 9, 16, 27, 38, 53, 56)
+    """
+    return tuple(_backbone(CfgComposer(416, 416, 1, (8, 16, 32), YOLOV3_ANCHORS_PX)))
+
+
 def efficientnet_lite0_cfg(
     classes: int, width_px: int = 416, height_px: int = 416, anchors_px: Anchors = YOLOV3_ANCHORS_PX
 ) -> str:

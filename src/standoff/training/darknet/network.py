@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import cast
 
 import torch
@@ -154,6 +155,7 @@ class DarknetNetwork(nn.Module):
         self.blocks = nn.ModuleList(_block(layer, channels[index]) for index, layer in enumerate(cfg.layers))
         self._kept = {layer.source for layer in cfg.layers if isinstance(layer, Shortcut)}
         self._kept.update(source for layer in cfg.layers if isinstance(layer, Route) for source in layer.sources)
+        self._heads = [index for index, layer in enumerate(cfg.layers) if isinstance(layer, Yolo)]
 
     def forward(self, pictures: Tensor) -> tuple[Tensor, ...]:
         """Run the network.
@@ -164,8 +166,19 @@ class DarknetNetwork(nn.Module):
         Returns:
             The raw map of each head, (B, anchors * values, h, w): what the last convolution says.
         """
+        return self.maps(pictures, self._heads)
+
+    def maps(self, pictures: Tensor, wanted: Sequence[int]) -> tuple[Tensor, ...]:
+        """Run the network as far as is needed for the maps of some layers.
+
+        Args:
+            pictures: (B, channels, H, W), 0 to 1.
+            wanted: Layers by their places in the cfg, rising.
+
+        Returns:
+            Of each, (B, its channels, h, w).
+        """
         kept: dict[int, Tensor] = {}
-        heads: list[Tensor] = []
         features = pictures
         for index, (layer, block) in enumerate(zip(self.cfg.layers, self.blocks, strict=True)):
             if isinstance(layer, Route):
@@ -173,11 +186,11 @@ class DarknetNetwork(nn.Module):
             elif isinstance(layer, Shortcut):
                 features = features + kept[layer.source]
             features = block(features)
-            if isinstance(layer, Yolo):
-                heads.append(features)
-            if index in self._kept:
+            if index in self._kept or index in wanted:
                 kept[index] = features
-        return tuple(heads)
+            if index == wanted[-1]:
+                break
+        return tuple(kept[index] for index in wanted)
 
     def convolutions(self) -> tuple[tuple[int, ConvolutionBlock], ...]:
         """Return the convolutional blocks with their layer numbers, in the order of a weights file."""

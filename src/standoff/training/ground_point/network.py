@@ -1,22 +1,45 @@
-"""The network of ground points: convolutions, a map of where the point may be, and how sure that is.
+"""The network of ground points: a detector's eyes, a map of where the point may be, and how sure that is.
 
 The mean of a map that sums to 1 is a place that moves smoothly with it (integral regression: Sun et al., Integral
-Human Pose Regression, 2018, eq. 2); each class has its own map, and its own errors, of one trunk.
+Human Pose Regression, 2018, eq. 2); each class has its own map, and its own errors, of one trunk. The trunk is the
+first layers of a detector, which has seen thousands of machines: from nothing, boxes with known points are too few.
 """
 
 from __future__ import annotations
 
-from typing import Final
+from pathlib import Path
+from typing import Final, Self
 
 import torch
 from torch import Tensor, nn
 
 from standoff.stages.detect import POINT_CLASSES, POINT_CROP_PX
+from standoff.training.architectures.efficientnet_lite import efficientnet_lite0_cfg, stage_layers
+from standoff.training.darknet.cfg import parse_cfg
+from standoff.training.darknet.network import DarknetNetwork
+from standoff.training.darknet.shapes import layer_shapes
+from standoff.training.start.exported_weights import read_exported
 
 LOG_SIGMA: Final = (-5.0, 1.0)
 """Least and largest logarithm of a stated standard error, in sides of the crop."""
 _REACH: Final = 1.5
 """Side of the area of which the map tells, in sides of the crop: a foot may be cut off with it."""
+_AS_IT_IS: Final = 6
+"""So many layers of the trunk see edges and colours, and are left as they are."""
+_WIDTH: Final = 64
+
+
+def read_eyes(path: Path) -> DarknetNetwork:
+    """Read the detector whose first layers a network of ground points starts with.
+
+    Args:
+        path: An exported detector of the architecture `efficientnet-lite0`.
+
+    Raises:
+        ModelError: It is none.
+    """
+    network, _ = read_exported(parse_cfg(efficientnet_lite0_cfg(1)), path)
+    return network
 
 
 class GroundPointNetwork(nn.Module):
@@ -24,19 +47,27 @@ class GroundPointNetwork(nn.Module):
 
     Crops are (N, 3, S, S) with S = `POINT_CROP_PX`, red first, 0 to 1; the result is (N, C, 4): x and y from 0 to 1
     across and down the crop, perhaps beyond, and the logarithms of their standard errors.
+
+    Args:
+        eyes: A detector, of which it takes the layers up to stride 16; its normalisations stay as they are.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, eyes: DarknetNetwork) -> None:
         super().__init__()
         count = len(POINT_CLASSES)
-        self.fine = nn.Sequential(
-            _layer(3, 16, 2), _layer(16, 24, 2), _layer(24, 32), _layer(32, 64, 2), _layer(64, 64), _layer(64, 64)
-        )
-        self.coarse = nn.Sequential(_layer(64, 96, 2), _layer(96, 96), _layer(96, 96))
-        self.back = nn.Sequential(nn.Conv2d(96, 64, 1, bias=False), nn.BatchNorm2d(64))
-        self.map = nn.Sequential(_layer(64, 64), nn.Conv2d(64, count, 1))
-        self.sigma = nn.Sequential(nn.Linear(96 + 64, 64), nn.ReLU(), nn.Linear(64, 2 * count))
-        self.nudge = nn.Linear(96, 2 * count)
+        ends = stage_layers()
+        self._wanted = ends[2], ends[4]
+        self.eyes = eyes
+        del eyes.blocks[ends[4] + 1 :]
+        for block in eyes.blocks[:_AS_IT_IS]:
+            block.requires_grad_(requires_grad=False)
+        shapes = layer_shapes(eyes.cfg)
+        fine, coarse = (shapes[layer].channels for layer in self._wanted)
+        self.fine = nn.Sequential(nn.Conv2d(fine, _WIDTH, 1, bias=False), nn.BatchNorm2d(_WIDTH))
+        self.coarse = nn.Sequential(nn.Conv2d(coarse, _WIDTH, 1, bias=False), nn.BatchNorm2d(_WIDTH))
+        self.map = nn.Sequential(_layer(_WIDTH, _WIDTH), _layer(_WIDTH, _WIDTH), nn.Conv2d(_WIDTH, count, 1))
+        self.sigma = nn.Sequential(nn.Linear(coarse + _WIDTH, 64), nn.ReLU(), nn.Linear(64, 2 * count))
+        self.nudge = nn.Linear(coarse, 2 * count)
         nn.init.zeros_(self.nudge.weight)
         cells = POINT_CROP_PX // 8
         places = (torch.arange(cells) + 0.5) / cells
@@ -48,11 +79,17 @@ class GroundPointNetwork(nn.Module):
         with torch.no_grad():
             self.nudge.bias.copy_((points - 0.5).flatten())
 
+    def train(self, mode: bool = True) -> Self:
+        """Leave the normalisations of the eyes as they are: an exported detector has no statistics to go on with."""
+        super().train(mode)
+        self.eyes.eval()
+        return self
+
     def forward(self, crops: Tensor) -> Tensor:
         """See the class."""
-        fine = self.fine(crops - 0.45)
-        coarse = self.coarse(fine)
-        joined = torch.relu(fine + nn.functional.interpolate(self.back(coarse), scale_factor=2.0, mode="nearest"))
+        fine, coarse = self.eyes.maps(crops, self._wanted)
+        above = nn.functional.interpolate(self.coarse(coarse), scale_factor=2.0, mode="nearest")
+        joined = torch.relu(self.fine(fine) + above)
         logits = self.map(joined)
         shares = logits.flatten(2).softmax(dim=2).reshape(logits.shape)
         x, y = (shares.sum(dim=2) * self.places).sum(dim=2), (shares.sum(dim=3) * self.places).sum(dim=2)

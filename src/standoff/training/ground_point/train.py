@@ -19,7 +19,7 @@ from torch.utils.data import DataLoader, Dataset
 
 from standoff.core.errors import DataError
 from standoff.core.homography import FloatArray
-from standoff.core.types import IntArray
+from standoff.core.types import ImageArray, IntArray
 from standoff.files.whole import whole_file
 from standoff.stages.detect import (
     CLASS_INPUT,
@@ -31,12 +31,16 @@ from standoff.stages.detect import (
     point_metadata,
 )
 from standoff.training.darknet.export import OPSET
-from standoff.training.ground_point.crops import PATCH_PX, Patches, drawn_crop, middle_crop
+from standoff.training.darknet.network import DarknetNetwork
+from standoff.training.ground_point.crops import PATCH_PX, Patches, boxed_crop, drawn_crop
 from standoff.training.ground_point.network import LOG_SIGMA, GroundPointNetwork, ToldPoints
 from standoff.training.pictures.augment_params import AugmentParams
+from standoff.training.quantization.half_precision import halve_weights
 from standoff.training.run.point_loss import point_loss
 
 _PULL: Final = 5.0
+_EYES_RATE: Final = 0.3
+"""Of the learning rate: what a detector has learnt is not to be forgotten."""
 _ELLIPSE_95: Final = math.sqrt(-2.0 * math.log(0.05))
 """How many standard errors the ellipse about a point reaches that holds 95 of 100."""
 
@@ -56,9 +60,9 @@ class PointTraining:
         workers: Processes that draw crops.
     """
 
-    steps: int = 7_000
+    steps: int = 3_000
     batch: int = 64
-    learning_rate: float = 2e-3
+    learning_rate: float = 1e-3
     decay: float = 0.01
     ema: float = 0.999
     rare: float = 0.3
@@ -108,12 +112,13 @@ class _Drawn(Dataset[tuple[Tensor, Tensor, int]]):
 
 
 def train_points(
-    patches: Patches, plan: PointTraining, on_step: Callable[[], None] | None = None
+    patches: Patches, eyes: DarknetNetwork, plan: PointTraining, on_step: Callable[[], None] | None = None
 ) -> GroundPointNetwork:
-    """Train from nothing.
+    """Train a network of ground points.
 
     Args:
         patches: To learn from.
+        eyes: The detector that it starts from; its first layers become the network's own.
         plan: How long and how fast.
         on_step: Called after each.
 
@@ -127,12 +132,18 @@ def train_points(
             fix="render some with `standoff simulate dataset`, or mark them",
         )
     torch.manual_seed(plan.seed)
-    network = GroundPointNetwork()
+    network = GroundPointNetwork(eyes)
     network.begin_at(_usual_points(patches))
     mean = AveragedModel(network, avg_fn=_running_mean(plan.ema), use_buffers=True)
-    optimizer = torch.optim.AdamW(network.parameters(), lr=plan.learning_rate, weight_decay=plan.decay)
+    seeing = set(network.eyes.parameters())
+    rates = {plan.learning_rate: set(network.parameters()) - seeing, plan.learning_rate * _EYES_RATE: seeing}
+    groups = [
+        {"params": [one for one in network.parameters() if one in part and one.requires_grad]}
+        for part in rates.values()
+    ]
+    optimizer = torch.optim.AdamW(groups, lr=plan.learning_rate, weight_decay=plan.decay)
     schedule = torch.optim.lr_scheduler.OneCycleLR(
-        optimizer, plan.learning_rate, plan.steps, pct_start=0.02, final_div_factor=4.0
+        optimizer, list(rates), plan.steps, pct_start=0.02, final_div_factor=4.0
     )
     for crops, points, class_index in _batches(patches, plan):
         told = _of_class(network(_as_input(crops)), class_index)
@@ -186,12 +197,23 @@ def _of_class(told: Tensor, class_index: Tensor) -> Tensor:
     return told.gather(1, class_index.reshape(-1, 1, 1).expand(-1, 1, 4)).squeeze(1)
 
 
-def measure_points(network: GroundPointNetwork, patches: Patches) -> list[PointError]:
-    """Say how far off the network is on crops that it did not learn from, class by class."""
-    told = _all_told(network, patches)
-    true = np.array([middle_crop(*one)[1] for one in zip(patches.images, patches.point, strict=True)]).reshape(-1, 2)
-    off = POINT_CROP_AROUND * np.linalg.norm(told[:, :2] - true, axis=1)
-    sigmas = np.linalg.norm((told[:, :2] - true) / np.exp(told[:, 2:]), axis=1)
+def measure_points(network: GroundPointNetwork, patches: Patches, seed: int = 0) -> list[PointError]:
+    """Say how far off the network is on crops that it did not learn from, boxed as a detector does, class by class.
+
+    Args:
+        network: Trained.
+        patches: Not learnt from.
+        seed: Of the boxes.
+    """
+    rng = np.random.default_rng(seed)
+    off, sigmas = np.zeros(len(patches)), np.zeros(len(patches))
+    for start in range(0, len(patches), 256):
+        rows = np.arange(start, min(start + 256, len(patches)))
+        crops, true = zip(*(boxed_crop(rng, patches.images[k], patches.point[k]) for k in rows), strict=True)
+        told = _told(network, np.array(crops)[..., ::-1], patches.class_index[rows])
+        away = told[:, :2] - np.array(true)
+        off[rows] = POINT_CROP_AROUND * np.linalg.norm(away, axis=1)
+        sigmas[rows] = np.linalg.norm(away / np.exp(told[:, 2:]), axis=1)
     return [
         _error(name, off[patches.class_index == k], sigmas[patches.class_index == k])
         for k, name in enumerate(POINT_CLASSES)
@@ -206,16 +228,11 @@ def _error(name: str, off: FloatArray, sigmas: FloatArray) -> PointError:
     return PointError(name, len(off), float(np.median(off)), float(np.quantile(off, 0.95)), inside, stretch)
 
 
-def _all_told(network: GroundPointNetwork, patches: Patches) -> FloatArray:
-    parts = []
+def _told(network: GroundPointNetwork, crops: ImageArray, class_index: IntArray) -> FloatArray:
+    """Return (N, 4) of (N, S, S, 3) crops, red first: points and logarithms of their standard errors."""
     with torch.no_grad():
-        for start in range(0, len(patches), 256):
-            here = slice(start, start + 256)
-            images = patches.images[here]
-            crops = np.array([middle_crop(image, np.zeros(2))[0][:, :, ::-1] for image in images])
-            index: IntArray = patches.class_index[here]
-            parts.append(_of_class(network(_as_input(torch.from_numpy(crops))), torch.from_numpy(index)).numpy())
-    return np.concatenate([np.zeros((0, 4)), *parts]).astype(np.float64)
+        told = _of_class(network(_as_input(torch.from_numpy(crops.copy()))), torch.from_numpy(class_index))
+    return told.numpy().astype(np.float64)
 
 
 def write_points(
@@ -257,4 +274,5 @@ def write_points(
         onnx.helper.set_model_props(
             model, point_metadata(tells) | {key: json.dumps(value) for key, value in facts.items()}
         )
+        halve_weights(model.graph)
         onnx.save(model, str(path))

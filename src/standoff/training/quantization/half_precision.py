@@ -44,7 +44,7 @@ def store_half(model_in: Path, model_out: Path) -> None:
         OutputError: The file cannot be written.
     """
     model, card = read_own_model(model_in)
-    if not _halve_weights(model.graph):
+    if not halve_weights(model.graph):
         raise ModelError(
             expected=f"float32 weights in {model_in.name}",
             found="none: they are stored smaller already",
@@ -62,7 +62,7 @@ def store_half(model_in: Path, model_out: Path) -> None:
             )
 
 
-def _halve_weights(graph: onnx.GraphProto) -> int:
+def halve_weights(graph: onnx.GraphProto) -> int:
     """Replace weights in place; return how many."""
     wanted = {name for node in graph.node if node.op_type in _WEIGHTED for name in node.input[1:]}
     tensors = [
