@@ -133,7 +133,8 @@ def dataset(
     ] = None,
     mesh_share: Annotated[float, typer.Option(min=0, max=1, help="Of the scenes whose excavators these are.")] = 1 / 3,
     cast: Annotated[
-        Literal["random", "excavators"], typer.Option(help="Who is there: anybody, or excavators with some people.")
+        Literal["random", "excavators", "machines"],
+        typer.Option(help="Who is there: anybody; or excavators, or other machines, as many as find room, and people."),
     ] = "random",
     processes: _Processes = 2,
     overwrite: _Overwrite = False,

@@ -57,11 +57,13 @@ def test_a_crowd_has_the_workers_and_machines_that_are_wanted(workers: int, mach
 
 
 @pytest.mark.parametrize("seed", seeds(3))
-def test_all_machines_among_excavators_are_excavators_and_there_are_several(seed: int) -> None:
-    cast = _cast("excavators", seed)
-    machines = [actor.model for actor in cast.actors if not is_person(actor.model)]
-    assert {model.class_id for model in machines} == {CLASS_BY_NAME["excavator"].id}
-    assert 2 <= len(machines) < len(cast.actors)
+def test_sites_packed_with_machines_have_several_of_the_wanted_kinds_and_people(seed: int) -> None:
+    excavator = CLASS_BY_NAME["excavator"].id
+    for name in ("excavators", "machines"):
+        cast = _cast(name, seed)
+        machines = [actor.model for actor in cast.actors if not is_person(actor.model)]
+        assert all((model.class_id == excavator) == (name == "excavators") for model in machines)
+        assert 2 <= len(machines) < len(cast.actors)
 
 
 @pytest.mark.parametrize("seed", seeds(3))

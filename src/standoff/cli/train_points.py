@@ -29,9 +29,7 @@ def train_points(
     ] = None,
     weights: Annotated[
         str,
-        typer.Option(
-            help="Detector whose first layers it starts with: site, or an exported efficientnet-lite0."
-        ),
+        typer.Option(help="Detector whose first layers it starts with: site, or an exported efficientnet-lite0."),
     ] = "site",
     steps: Annotated[int, typer.Option(min=1, help="Batches of 64 boxes.")] = 3000,
     seed: Annotated[int, typer.Option(min=0, help="Of everything random.")] = 0,

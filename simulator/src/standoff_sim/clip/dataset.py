@@ -7,7 +7,7 @@ from contextlib import closing, contextmanager
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Literal, TypeAlias, get_args
 
 import cv2
 import numpy as np
@@ -28,6 +28,7 @@ from standoff_sim.scene.moment import scene_at
 from standoff_sim.scene.scene import Scene
 from standoff_sim.scene.site import Site, build_site
 
+CastName: TypeAlias = Literal["random", "excavators", "machines"]
 _SCENE_FRAMES = 240
 _SHUTTERS_S = (0.0, 0.0, 1 / 240, 1 / 100)
 """Least exposure times: how much a passing drone smears its pictures."""
@@ -48,7 +49,8 @@ class DatasetPlan:
         seed: Of everything random.
         excavator_mesh: Folder of mesh parts for some of the excavators, or None.
         mesh_share: Of the scenes whose excavators are made of them.
-        cast: Who is there: `random`, few or many of all kinds, or `excavators`, with some people.
+        cast: Who is there: `random`, few or many of all kinds; `excavators` or `machines`, as many as find room of
+            these or of all other kinds, with some people.
 
     Raises:
         ConfigError: A size or seed out of range.
@@ -63,7 +65,7 @@ class DatasetPlan:
     seed: int
     excavator_mesh: Path | None = None
     mesh_share: float = 1 / 3
-    cast: Literal["random", "excavators"] = "random"
+    cast: CastName = "random"
 
     def __post_init__(self) -> None:
         check_seed(self.seed)

@@ -26,7 +26,7 @@ from standoff_sim.scene.ordinary import ordinary_site
 from standoff_sim.scene.scene import Model, Motion
 
 _TRIES = 12
-_EXCAVATOR_TRIES = 14
+_PACKING_TRIES = 14
 _BUSY_WORKERS, _BUSY_MACHINES = 8, 5
 _BREACH_M, _NEAR_MISS_M = 5.6, 8.4
 """Distances of worker and wheel loader, whose circles touch at 7.8 m."""
@@ -229,12 +229,27 @@ def _any_number(rng: np.random.Generator, area: FilmedArea) -> Cast:
 
 def _excavators(rng: np.random.Generator, area: FilmedArea) -> Cast:
     """Excavators in every stance, with some people: what a network of ground points is to learn most."""
-    cast, lasting_s = Cast(), area.duration_s
-    cast.reserved += area.reserved()
     scripts = behaviour.digging, behaviour.grading, behaviour.idle
-    for _ in range(_EXCAVATOR_TRIES):
+
+    def draw() -> _Activity:
         excavator, script = area.excavator(rng), scripts[int(rng.integers(len(scripts)))]
-        cast.add([excavator], [script(rng, excavator, _spot(rng, area), lasting_s)])
+        return [excavator], [script(rng, excavator, _spot(rng, area), area.duration_s)]
+
+    return _packed(rng, area, draw)
+
+
+def _machines(rng: np.random.Generator, area: FilmedArea) -> Cast:
+    """Machines of every kind but excavators, with some people."""
+    kinds = "spread", "roll", "doze", "drive"
+    return _packed(rng, area, lambda: _lone_machine(rng, area, kinds[int(rng.integers(len(kinds)))], _spot(rng, area)))
+
+
+def _packed(rng: np.random.Generator, area: FilmedArea, draw: Callable[[], _Activity]) -> Cast:
+    """Fill the picture with as many machines as find room, and let some people work between them."""
+    cast = Cast()
+    cast.reserved += area.reserved()
+    for _ in range(_PACKING_TRIES):
+        cast.add(*draw())
     for _ in range(int(rng.integers(1, 9))):
         cast.add(*_people_activity(rng, area, 2, cast))
     return cast
@@ -249,6 +264,7 @@ CASTS: Mapping[str, Callable[[np.random.Generator, FilmedArea], Cast]] = Mapping
         "board": _nobody,
         "random": _any_number,
         "excavators": _excavators,
+        "machines": _machines,
         "ordinary": ordinary_site,
         "busy": partial(crowd, workers=_BUSY_WORKERS, machines=_BUSY_MACHINES),
     }
