@@ -115,6 +115,16 @@ def test_a_part_of_the_picture_is_hatched_as_it_is_in_the_whole() -> None:
     assert changed[:, 10:230].all() and not changed[:, 250:].any()
 
 
+def test_a_part_that_shows_watched_ground_only_stays_as_it_is_whatever_the_rest_shows() -> None:
+    cells = np.full((ROWS, COLUMNS), WATCHED, dtype=np.int8)
+    cells[:, : COLUMNS // 4] = TOO_SMALL
+    shade, canvas = PictureShade(), np.full((90, 160, 3), 100, dtype=np.uint8)
+    for part in ((0.5, 0.5, 1.0, 1.0), (0.0, 0.0, 0.5, 0.5), (0.5, 0.5, 1.0, 1.0)):
+        drawn = canvas.copy()
+        shade.draw(drawn, cells, np.array(part))
+        assert (drawn == canvas).all() == (part[0] == 0.5)
+
+
 def test_where_nobody_judged_or_wants_to_see_it_nothing_is_hatched() -> None:
     result, picture = FakeSite(SIZE).result(0), noise(SIZE)
     wanted, unwanted = DrawParams(), DrawParams(unwatched=False)

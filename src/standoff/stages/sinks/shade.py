@@ -21,6 +21,7 @@ _DARKER, _LIGHTER = 24, 18
 _LINES_IN_HEIGHT = 42
 _LINE_IN_HEIGHT = 340
 _COARSER = 4
+_NOTHING: ImageArray = np.zeros((0, 0, 3), dtype=np.uint8)
 
 
 def diagonals(size_px: tuple[int, int]) -> Opacity:
@@ -54,7 +55,7 @@ class Shade:
         self._lines = diagonals(size_px)
         self._parts: tuple[bytes, ...] = ()
         self._there = slice(0), slice(0)
-        self._darker = self._lighter = np.zeros((0, 0, 3), dtype=np.uint8)
+        self._darker = self._lighter = _NOTHING
 
     def draw(self, canvas: ImageArray, parts: tuple[bytes, ...], opacity: Callable[[], Opacity]) -> None:
         """Draw over a picture, in place.
@@ -69,9 +70,15 @@ class Shade:
             left, top, wide, high = cv2.boundingRect(there)
             self._there = slice(top, top + high), slice(left, left + wide)
             there, lines = there[self._there], self._lines[self._there]
+            if not there.size:
+                # A part of a picture may show none of what is marked in the whole.
+                self._darker = self._lighter = _NOTHING
+                return
             darker = cv2.convertScaleAbs(there, alpha=_DARKER / 255.0)
             lighter = cv2.convertScaleAbs(cv2.bitwise_and(there, lines), alpha=(_DARKER + _LIGHTER) / 255.0)
             self._darker, self._lighter = (np.asarray(cv2.merge([one] * 3)) for one in (darker, lighter))
+        if not self._darker.size:
+            return
         # Dark ground shows the lines, bright ground the shade; both operations saturate, and cost a tenth of a blend.
         marked = canvas[self._there]
         cv2.subtract(marked, self._darker, dst=marked)
