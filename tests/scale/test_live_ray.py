@@ -26,7 +26,7 @@ PROJECT = Path(__file__).resolve().parents[2]
 PATHS = os.pathsep.join(str(PROJECT / part) for part in ("src", "simulator/src", "tests"))
 ENVIRONMENT = {**os.environ, "PYTHONPATH": PATHS, "RAY_worker_niceness": "0"}
 """As whoever typed it, but that Ray's workers give way to nobody: other tests run beside these."""
-PATIENCE_S = 120.0
+PATIENCE_S = 300.0
 ALL_COMPLETE = dict.fromkeys(FILMS, ("complete", ""))
 
 pytestmark = pytest.mark.live
