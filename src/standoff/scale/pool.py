@@ -10,6 +10,7 @@ import tempfile
 import time
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Final
@@ -68,6 +69,14 @@ def watch_films(
         yield from Machines(ray, cores_per_film).watch(plans)
 
 
+@dataclass(frozen=True, slots=True)
+class _Handed:
+    """A plan that a process has, and how many processes were lost with it before."""
+
+    plan: FilmPlan
+    lost: int = 0
+
+
 class Machines:
     """What Ray has to watch films with.
 
@@ -95,42 +104,55 @@ class Machines:
         # Each film's libraries would otherwise take all cores of the machine.
         threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), str(self._needs))
         self._begin = ray.remote(watch or _watch).options(
-            num_cpus=self._needs, max_retries=_TRIES_AGAIN, runtime_env={"env_vars": threads}
+            # We begin again ourselves: what was handed to a machine that is just dying, Ray takes for lost at once.
+            num_cpus=self._needs,
+            max_retries=0,
+            runtime_env={"env_vars": threads},
         )
 
     def watch(self, plans: Iterable[FilmPlan]) -> Iterator[FilmResult]:
         """Yield the result of each plan when it is done."""
-        waiting: dict[Any, FilmPlan] = {}
+        waiting: dict[Any, _Handed] = {}
         for plan in plans:
-            waiting[self._begin.remote(plan, self._needs)] = plan
+            self._hand(waiting, _Handed(plan))
             if len(waiting) >= _AHEAD * max(1, self._places()):
                 yield self._next(waiting)
         while waiting:
             yield self._next(waiting)
 
-    def _next(self, waiting: dict[Any, FilmPlan]) -> FilmResult:
-        """Wait for one film, and forget it."""
+    def _hand(self, waiting: dict[Any, _Handed], handed: _Handed) -> None:
+        waiting[self._begin.remote(handed.plan, self._needs)] = handed
+
+    def _next(self, waiting: dict[Any, _Handed]) -> FilmResult:
+        """Wait for one film, and forget it; one whose process was lost begins again."""
         seen_s = time.monotonic()
         while True:
             done, _ = self._ray.wait(list(waiting), num_returns=1, timeout=_LOOKS_EVERY_S)
             if done:
-                return self._result(done[0], waiting.pop(done[0]))
+                handed = waiting.pop(done[0])
+                result = self._result(done[0], handed)
+                if result is not None:
+                    return result
+                self._hand(waiting, _Handed(handed.plan, handed.lost + 1))
             if self._places():
                 seen_s = time.monotonic()
             elif time.monotonic() - seen_s > _NO_MACHINE_S:
                 lost = next(iter(waiting))
-                plan = waiting.pop(lost)
+                plan = waiting.pop(lost).plan
                 message = f"no machine of the cluster has {self._needs} cores any more"
                 return FilmResult(plan.film, plan.out, "failed", message)
 
-    def _result(self, done: Any, plan: FilmPlan) -> FilmResult:  # noqa: ANN401
-        errors = self._ray.exceptions
+    def _result(self, done: Any, handed: _Handed) -> FilmResult | None:  # noqa: ANN401
+        """Return the result of a film; None: its process was lost, and another is to watch it."""
+        errors, plan = self._ray.exceptions, handed.plan
         try:
             result: FilmResult = self._ray.get(done)
         except errors.RayTaskError as error:
             # A fault of ours in one film, or of a stage of somebody's own: the others go on.
             return FilmResult(plan.film, plan.out, "failed", _one_line(f"{type(error.cause).__name__}: {error.cause}"))
         except errors.RayError as error:
+            if handed.lost < _TRIES_AGAIN:
+                return None
             message = _one_line(f"its process was lost {_TRIES_AGAIN + 1} times: {error}")
             return FilmResult(plan.film, plan.out, "failed", message)
         return result
