@@ -29,7 +29,7 @@ PUBLIC_NAMES = {
         "GroundSettings", "MarkerSettings", "ReferenceSettings", "Replacement", "STAGE_NAMES", "Settings",
         "SiteSettings", "StreamSettings", "build_ground", "build_marker_observer", "build_replacement", "build_stage",
         "build_watcher", "build_zones", "import_factory", "load_settings", "load_site", "named_files", "read_params",
-        "read_settings_file", "recorded_settings", "resolved",
+        "read_settings_file", "recorded_settings", "resolved", "site_origin",
     },
     "standoff.evaluation.coverage": {
         "ClipSamples", "CoverageResult", "PairRow", "PairSamples", "PositionRow", "PositionSamples",

@@ -20,13 +20,14 @@ def schema(
     """Print the JSON Schema of an output, or the names of all; or write all of them to a folder."""
     from standoff.cli.console import write_json
     from standoff.core.errors import ConfigError
+    from standoff.files.whole import make_folder
     from standoff.schemas import SCHEMAS
 
     if name is not None and name not in SCHEMAS:
         raise ConfigError(expected=f"an output, {', '.join(SCHEMAS)}", found=name, fix="give one of them, or none")
     names = [*SCHEMAS] if name is None else [name]
     if out is not None:
-        out.mkdir(parents=True, exist_ok=True)
+        make_folder(out)
         for one in names:
             write_json(SCHEMAS[one](), out / f"{one}.schema.json")
         typer.echo(f"{out}: {', '.join(names)}")

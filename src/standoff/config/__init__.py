@@ -12,6 +12,7 @@ from standoff.config.build import (
     build_watcher,
     build_zones,
     import_factory,
+    site_origin,
 )
 from standoff.config.load import load_settings, named_files, read_settings_file, recorded_settings, resolved
 from standoff.config.markers import MarkerSettings
@@ -48,4 +49,5 @@ __all__ = [
     "read_settings_file",
     "recorded_settings",
     "resolved",
+    "site_origin",
 ]

@@ -12,6 +12,7 @@ from standoff.core.camera import Camera, CameraPrior
 from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.errors import ConfigError
 from standoff.core.finding import WorkerFinding
+from standoff.core.geographic import GeographicOrigin
 from standoff.core.protocols import CameraMotionEstimator, Detector, Ground, missing_of
 from standoff.core.zones import Zone
 from standoff.files.zone_file import read_zones
@@ -189,9 +190,18 @@ def build_zones(settings: Settings) -> tuple[Zone, ...]:
         return ()
     if "hazard" in settings.replace:
         raise _unread("zones", "a hazard stage of your own")
+    return read_zones(settings.zones, site_origin(settings))
+
+
+def site_origin(settings: Settings) -> GeographicOrigin | None:
+    """Return where on the earth the site frame begins; None: no survey in degrees says so.
+
+    Raises:
+        GroundError: The survey cannot be used.
+    """
     survey = settings.ground.survey
     own_ground = "ground" in settings.replace
-    return read_zones(settings.zones, None if survey is None or own_ground else load_survey(survey).origin)
+    return None if survey is None or own_ground else load_survey(survey).origin
 
 
 def _unread(what: str, beside: str) -> ConfigError:

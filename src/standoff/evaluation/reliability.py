@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from importlib.resources import files
 
-import jinja2
 from markupsafe import Markup
 
 from standoff.drawing.page_charts import MUTED, inline_svg, themed_figure
+from standoff.drawing.page_template import page_template
 from standoff.drawing.palette import HEX
 from standoff.evaluation.paper.metrics import DistanceScore
 from standoff.evaluation.stated_errors import ONE_SIGMA, PROBABILITIES, Coverage
@@ -27,8 +26,7 @@ def reliability_section(kinds: Sequence[Measured], checked_on: str) -> Markup:
         kinds: Each kind of pair.
         checked_on: What the truth is of, in a few words.
     """
-    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True)
-    template = environment.from_string((files("standoff.evaluation") / "reliability.html.j2").read_text("utf-8"))
+    template = page_template("standoff.evaluation", "reliability.html.j2")
     rows = [
         {
             "name": kind.replace("_", " "),

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Final
 from urllib.parse import quote
 
-import jinja2
 from markupsafe import Markup
 
 from standoff import __version__
@@ -21,6 +20,7 @@ from standoff.core.hazards import GRAVENESS
 from standoff.core.lengths import UNITS, LengthUnit, UnitName
 from standoff.core.outputs import ASSISTANCE, OUTPUTS
 from standoff.core.watched_shares import percent_text
+from standoff.drawing.page_template import page_template
 from standoff.files.whole import whole_file
 from standoff.scale.result import FilmResult, Findings, Moment
 
@@ -57,9 +57,8 @@ def write_overview(results: Sequence[FilmResult], path: Path, unit: UnitName = "
 
 def render(results: Sequence[FilmResult], folder: Path, unit: LengthUnit) -> str:
     """Return the page for a folder."""
-    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True)
-    environment.filters.update(percent=percent_text, hours=_hours, clock=minutes_text, length=unit.length)
-    template = environment.from_string((files("standoff.scale") / "overview.html.j2").read_text(encoding="utf-8"))
+    words = {"percent": percent_text, "hours": _hours, "clock": minutes_text, "length": unit.length}
+    template = page_template("standoff.scale", "overview.html.j2", **words)
     films = [_Film(one, _report(one, folder)) for one in results]
     found = [one.found for one in results if one.found is not None]
     hazards: Counter[str] = Counter()

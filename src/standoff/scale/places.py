@@ -8,11 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from standoff.config import Settings
+from standoff.config import Settings, site_origin
 from standoff.core.geographic import GeographicOrigin
 from standoff.files.json_text import write_json
 from standoff.scale.result import FilmResult, Moment
-from standoff.stages.ground import load_survey
 
 _DIGITS = 7
 """Of a degree: a centimetre."""
@@ -33,8 +32,7 @@ def write_moments(results: Sequence[FilmResult], path: Path, settings: Settings)
         OutputError: The file cannot be written.
         GroundError: The survey cannot be read.
     """
-    survey = settings.ground.survey
-    origin = None if survey is None or "ground" in settings.replace else load_survey(survey).origin
+    origin = site_origin(settings)
     if origin is None:
         return False
     moments = [(one, moment) for one in results if one.found is not None for moment in one.found.worst]

@@ -7,10 +7,10 @@ from datetime import UTC, datetime
 from importlib.resources import files
 from pathlib import Path
 
-import jinja2
 from markupsafe import Markup
 
 from standoff import __version__
+from standoff.drawing.page_template import page_template
 from standoff.evaluation.coverage.score import ALL, CoverageResult
 from standoff.evaluation.reliability import reliability_section
 from standoff.files.whole import make_folder, whole_file
@@ -29,9 +29,8 @@ def write_page(result: CoverageResult, path: Path) -> None:
 
 def render(result: CoverageResult) -> str:
     """Return the page."""
-    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True)
-    environment.filters.update(metres=_metres, percent=_percent, words=lambda name: name.replace("_", " "))
-    template = environment.from_string((files("standoff.evaluation.coverage") / "page.html.j2").read_text("utf-8"))
+    words = {"metres": _metres, "percent": _percent, "words": lambda name: name.replace("_", " ")}
+    template = page_template("standoff.evaluation.coverage", "page.html.j2", **words)
     checked_on = f"{result.clips} simulated clip" + "s" * (result.clips > 1)
     kinds = [(row.kind, row.score, row.coverage) for row in result.whole_kinds()]
     return template.render(

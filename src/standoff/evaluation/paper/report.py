@@ -10,12 +10,12 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-import jinja2
 import numpy as np
 from markupsafe import Markup
 
 from standoff import __version__
 from standoff.core.errors import OutputError
+from standoff.drawing.page_template import page_template
 from standoff.evaluation.paper.answers import UP_TO_M
 from standoff.evaluation.paper.benchmark_polynomial import DEGREE, KEPT_SD, MEDIAN_FRAMES
 from standoff.evaluation.paper.captions import ISOLATES, board_caption, number_text, pair_caption, published_for
@@ -56,10 +56,11 @@ def write_report(
 
 def render(results: Sequence[ClipResult], failures: Mapping[str, Exception]) -> str:
     """Return the page."""
-    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True)
-    environment.filters.update(number=number_text, percent=_percent, metres=_metres, picture=_data_uri, words=_words)
     here, look = files("standoff.evaluation.paper"), files("standoff.stages.sinks")
-    template = environment.from_string((here / "report.html.j2").read_text(encoding="utf-8"))
+    template = page_template(
+        "standoff.evaluation.paper", "report.html.j2",
+        number=number_text, percent=_percent, metres=_metres, picture=_data_uri, words=_words,
+    )  # fmt: skip
     css = (look / "report.css").read_text(encoding="utf-8") + (here / "report.css").read_text(encoding="utf-8")
     return template.render(
         version=__version__,

@@ -11,7 +11,6 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-import jinja2
 from markupsafe import Markup
 
 from standoff import __version__
@@ -19,6 +18,7 @@ from standoff.core.durations import minutes_text
 from standoff.core.outputs import ASSISTANCE
 from standoff.core.types import FrameResult, Outcome
 from standoff.core.zones import NOT_PLACED, ZONE_WORDS, Zone
+from standoff.drawing.page_template import page_template
 from standoff.files.json_text import plain
 from standoff.files.whole import partial_file
 from standoff.stages.sinks.collect import HazardLife, RunSummary
@@ -76,10 +76,11 @@ def render(summary: RunSummary, outcome: Outcome, warning_gap_m: float, checked:
     # matplotlib takes long to load; a run starts without it, and whoever imports another sink does not need it
     from standoff.stages.sinks.charts import pair_charts, plan_chart, site_chart, watched_chart
 
-    folder = files("standoff.stages.sinks")
-    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True)
-    environment.filters.update(clock=minutes_text, percent=_percent, length=summary.unit.length, said=summary.unit.said)
-    template = environment.from_string((folder / "report.html.j2").read_text(encoding="utf-8"))
+    unit = summary.unit
+    template = page_template(
+        "standoff.stages.sinks", "report.html.j2",
+        clock=minutes_text, percent=_percent, length=unit.length, said=unit.said,
+    )  # fmt: skip
     about, counts = outcome.about, outcome.counts
     has_frames = counts.rows["frames"] > 0
     hazards = sorted(summary.hazards.values(), key=_gravest_first)
@@ -87,7 +88,7 @@ def render(summary: RunSummary, outcome: Outcome, warning_gap_m: float, checked:
     return template.render(
         version=__version__,
         written_at=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
-        css=Markup((folder / "report.css").read_text(encoding="utf-8")),
+        css=Markup((files("standoff.stages.sinks") / "report.css").read_text(encoding="utf-8")),
         outcome=outcome,
         run=summary,
         counts=counts,

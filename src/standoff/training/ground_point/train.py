@@ -135,16 +135,12 @@ def train_points(
     network = GroundPointNetwork(eyes)
     network.begin_at(_usual_points(patches))
     mean = AveragedModel(network, avg_fn=_running_mean(plan.ema), use_buffers=True)
-    seeing = set(network.eyes.parameters())
-    rates = {plan.learning_rate: set(network.parameters()) - seeing, plan.learning_rate * _EYES_RATE: seeing}
-    groups = [
-        {"params": [one for one in network.parameters() if one in part and one.requires_grad]}
-        for part in rates.values()
-    ]
+    own = [one for name, one in network.named_parameters() if not name.startswith("eyes.")]
+    seeing = [one for one in network.eyes.parameters() if one.requires_grad]
+    rates = [plan.learning_rate, plan.learning_rate * _EYES_RATE]
+    groups = [{"params": own}, {"params": seeing}]
     optimizer = torch.optim.AdamW(groups, lr=plan.learning_rate, weight_decay=plan.decay)
-    schedule = torch.optim.lr_scheduler.OneCycleLR(
-        optimizer, list(rates), plan.steps, pct_start=0.02, final_div_factor=4.0
-    )
+    schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, rates, plan.steps, pct_start=0.02, final_div_factor=4.0)
     for crops, points, class_index in _batches(patches, plan):
         told = _of_class(network(_as_input(crops)), class_index)
         residual = told[:, :2] - points.float()
