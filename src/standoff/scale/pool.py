@@ -23,6 +23,8 @@ from standoff.scale.result import FilmResult
 
 ANSWERS_WITHIN_S: Final = 10.0
 """A cluster's head that has said nothing for so long is taken not to be there."""
+_JOINS: Final = 3
+"""So often somebody joins who is not let in."""
 _PORT: Final = 10001
 """Of a cluster's head, for those who are not part of it, unless the address says another."""
 _TRIES_AGAIN: Final = 3
@@ -236,11 +238,7 @@ def _on_this_machine(ray: Any, cores: int | None) -> Generator[None, None, None]
 
 @contextmanager
 def _joined(ray: Any, address: str) -> Generator[None, None, None]:  # noqa: ANN401
-    _reach(address)
-    try:
-        ray.init(address, **_SILENT)
-    except (ConnectionError, RuntimeError, ValueError) as error:
-        raise _nobody(address, _one_line(str(error))) from error
+    _join(ray, address)
     try:
         yield
     except (ConnectionError, _imported("grpc").RpcError) as error:
@@ -251,6 +249,23 @@ def _joined(ray: Any, address: str) -> Generator[None, None, None]:  # noqa: ANN
         ) from error
     finally:
         ray.shutdown()
+
+
+def _join(ray: Any, address: str) -> None:  # noqa: ANN401
+    """Become part of a cluster; one whose head answers but now and then fails to let us in is asked again.
+
+    The head makes a process for each who joins, by a fork beside threads of gRPC: one of twenty dies at once.
+    """
+    for left in reversed(range(_JOINS)):
+        _reach(address)
+        try:
+            ray.init(address, **_SILENT)
+        except (ConnectionError, RuntimeError, ValueError) as error:
+            if not left:
+                raise _nobody(address, _one_line(str(error))) from error
+            ray.shutdown()
+        else:
+            return
 
 
 @contextmanager
