@@ -4,6 +4,7 @@
 # make test-processors   the numeric tests as older processors would compute; TESTS=... for others
 # make licences   of all that a runtime install brings, against an allow list; writes dist/standoff.cdx.json (CycloneDX)
 # make bundle   a folder in dist/ that installs without a network: wheels for this platform, detector, docs; EXTRAS=scale for more
+# make page   the page of `standoff setup`, built with Node; before `pip install .`, or in place for an editable one
 # make docs   the documentation as a site in site/; a dead link fails
 # make coverage   how much of the packages that run on site their own tests reach
 # make fuzz   the laws with many more examples, and others each time; prints how to repeat a failure
@@ -27,7 +28,7 @@ COUNTED := tests/core tests/files tests/stages tests/monitor src/standoff/core s
 DEMO_VENV := .venv-demo
 SOURCES := $(shell find src -type f -not -path '*/__pycache__/*')
 
-.PHONY: help setup test test-live test-processors coverage fuzz lint types contracts licences bundle unit compiled demo demo-clean demo-pets docs bench lock clean
+.PHONY: help setup test test-live test-processors coverage fuzz lint types contracts licences bundle unit compiled demo demo-clean demo-pets docs page bench lock clean
 
 help:
 	@sed -n 's/^# make/make/p' Makefile
@@ -47,7 +48,7 @@ setup: $(READY)
 # bring a second OpenCV that overwrites the headless one.
 $(READY): pyproject.toml simulator/pyproject.toml requirements.lock requirements-oracles.txt
 	$(call empty_venv,$(VENV))
-	$(BIN)/python -m pip install --quiet --constraint requirements.lock --editable '.[dev,scale,train]' --editable ./simulator
+	$(BIN)/python -m pip install --quiet --constraint requirements.lock --editable '.[dev,scale,serve,train]' --editable ./simulator
 	$(BIN)/python -m pip install --quiet --no-deps --requirement requirements-oracles.txt
 	@touch $@
 
@@ -106,6 +107,12 @@ bench: $(READY)
 # The simulator is in it; what trains is not.
 bundle: $(READY)
 	$(BIN)/python shipping/bundle.py --extras "$(EXTRAS)"
+
+# Node 18 or newer; from apt where there is none.
+page:
+	@command -v npm >/dev/null || { sudo=$$([ "$$(id -u)" = 0 ] || echo sudo -n); \
+	  $$sudo apt-get update -qq && $$sudo apt-get install -y -qq nodejs npm; }
+	cd page && npm ci --silent --no-audit --no-fund && npm run --silent check && npm run --silent build
 
 docs: $(READY)
 	$(BIN)/mkdocs build --strict

@@ -26,6 +26,7 @@ from standoff.cli import (
     quantize,
     run,
     schema,
+    setup,
     simulator,
     train,
     train_points,
@@ -56,6 +57,7 @@ app.command("demo")(demo.demo)
 app.command("bench")(bench.bench)
 app.command("doctor")(doctor.doctor)
 app.command("schema")(schema.schema)
+app.command("setup")(setup.setup)
 
 
 def _join_verbs() -> None:

@@ -14,7 +14,15 @@ from standoff.config.build import (
     import_factory,
     site_origin,
 )
-from standoff.config.load import load_settings, named_files, read_settings_file, recorded_settings, resolved
+from standoff.config.load import (
+    anchor_paths,
+    load_settings,
+    named_files,
+    read_settings_file,
+    recorded_settings,
+    resolved,
+    settings_from,
+)
 from standoff.config.markers import MarkerSettings
 from standoff.config.params import read_params
 from standoff.config.settings import (
@@ -35,6 +43,7 @@ __all__ = [
     "Settings",
     "SiteSettings",
     "StreamSettings",
+    "anchor_paths",
     "build_ground",
     "build_marker_observer",
     "build_replacement",
@@ -49,5 +58,6 @@ __all__ = [
     "read_settings_file",
     "recorded_settings",
     "resolved",
+    "settings_from",
     "site_origin",
 ]

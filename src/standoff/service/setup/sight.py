@@ -1,0 +1,381 @@
+"""What a draft says of the ground in one picture, by the very stages that a run has."""
+
+from __future__ import annotations
+
+import json
+import threading
+from collections import OrderedDict
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Final
+
+import contourpy
+import cv2
+import numpy as np
+
+from standoff.config import Settings, build_ground, build_stage, build_watcher, settings_from
+from standoff.core.classes import CLASSES, Role, class_ids
+from standoff.core.errors import GroundError, StandoffError
+from standoff.core.homography import FloatArray
+from standoff.core.lengths import UNITS, LengthUnit
+from standoff.core.map_error import map_jacobian, picture_jacobian
+from standoff.core.pose import view_from_homography
+from standoff.core.protocols import AnyGround, Ground
+from standoff.core.types import (
+    Detections,
+    Frame,
+    GroundMap,
+    GroundPositions,
+    NoCameraMotion,
+    NoGroundMap,
+    Tracks,
+    WatchedGround,
+)
+from standoff.core.watched_ground import REASONS
+from standoff.drawing.ground_window import GroundWindow, camera_up, rectify, seen_ground_m, window_around
+from standoff.files.yaml_text import write_yaml
+from standoff.files.zone_file import write_zones
+from standoff.service.setup.answers import (
+    Contour,
+    Entity,
+    GroundAnswer,
+    Plan,
+    TapeAnswer,
+    Watched,
+)
+from standoff.service.setup.draft import Draft, Pixel
+from standoff.service.setup.film import Film
+
+_ALONE: Final = NoCameraMotion("one picture alone")
+_KEPT: Final = 8
+_SURE_SCORE: Final = 0.3
+_LEVELS_M: Final = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0)
+_CONTOUR_CELLS: Final = 64
+_PLAN_PX: Final = 560
+_CLICK_SIGMA_PX: Final = 1.0
+"""How well a hand with a magnifier puts a point of the tape."""
+_TURNS: Final = np.linspace(0.0, 2.0 * np.pi, 49)
+_CIRCLE: Final = np.column_stack([np.cos(_TURNS), np.sin(_TURNS)])
+_EDGE_STEPS: Final = 16
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Seen:
+    """One picture with one draft.
+
+    Attributes:
+        frame: The picture.
+        settings: What the draft says.
+        ground: Its map, or why there is none.
+        detections: Who is there.
+        about: What the ground stage says of itself.
+    """
+
+    frame: Frame
+    settings: Settings
+    ground: GroundMap | NoGroundMap
+    detections: Detections
+    about: Mapping[str, Any]
+
+
+class Sight:
+    """Answers what a draft says of pictures of a film.
+
+    Args:
+        film: The film.
+        base: Settings by name that the draft is laid over: those of the site's file.
+        detects: Whether the detector looks at pictures; it takes a moment for each new one.
+    """
+
+    def __init__(self, film: Film, base: Mapping[str, Any], *, detects: bool = True) -> None:
+        self.film = film
+        self._base = base
+        self._detects = detects
+        self._folder = TemporaryDirectory(prefix="standoff-setup-")
+        self._lock = threading.Lock()
+        self._seen: OrderedDict[tuple[float, str], Seen] = OrderedDict()
+
+    def close(self) -> None:
+        """Remove the files that the draft needed."""
+        self._folder.cleanup()
+
+    def settings(self, draft: Draft) -> Settings:
+        """Return what a draft says, laid over the settings of the site's file.
+
+        Raises:
+            StandoffError: It contradicts itself.
+        """
+        survey, zones = (Path(self._folder.name) / name for name in ("survey.yaml", "zones.geojson"))
+        own = draft.settings(survey, zones)
+        if draft.ground == "survey":
+            write_yaml(survey, draft.survey_text(self.film.size_px))
+        if draft.zones:
+            write_zones(zones, draft.zones_of_site())
+        return settings_from({}, "the draft", laid_over(self._base, own))
+
+    def see(self, time_s: float, draft: Draft) -> Seen:
+        """Look at a picture with a draft; the last few looks are remembered.
+
+        Raises:
+            StandoffError: The draft contradicts itself, or the film cannot be read.
+        """
+        frame = self.film.frame(time_s)
+        key = frame.time_s, json.dumps(draft.model_dump(mode="json"), sort_keys=True)
+        with self._lock:
+            if key in self._seen:
+                self._seen.move_to_end(key)
+                return self._seen[key]
+            settings = self.settings(draft)
+            detections = self.film.found(frame) if self._detects else Detections.empty()
+            stage = build_ground(settings, self.film.camera_prior)
+            stage.prepare(self.film.size_px)
+            ground = self._map(stage, frame, detections, draft)
+            self._seen[key] = seen = Seen(frame, settings, ground, detections, stage.describe())
+            while len(self._seen) > _KEPT:
+                self._seen.popitem(last=False)
+            return seen
+
+    def _map(self, stage: Ground, frame: Frame, detections: Detections, draft: Draft) -> GroundMap | NoGroundMap:
+        """Map the picture that was clicked in, then carry on to another one if that is asked for."""
+        told_s = {"reference": draft.reference.time_s, "survey": draft.survey.time_s}.get(draft.ground, frame.time_s)
+        told = self.film.frame(told_s)
+        if told.time_s == frame.time_s:
+            return stage.update(frame, detections, _ALONE)
+        stage.update(told, self.film.found(told) if self._detects else Detections.empty(), _ALONE)
+        # Not clicked in this one: only what is found again counts.
+        return stage.update(frame, detections, _ALONE)
+
+    def answer(self, time_s: float, draft: Draft) -> GroundAnswer:
+        """Say everything about one picture.
+
+        Raises:
+            StandoffError: The film cannot be read.
+        """
+        missing = draft.missing()
+        if missing:
+            return GroundAnswer(time_s=time_s, found=False, missing=missing, reason="")
+        try:
+            seen = self.see(time_s, draft)
+        except StandoffError as error:
+            return GroundAnswer(time_s=time_s, found=False, missing="", reason=str(error))
+        warnings = [str(one) for one in seen.about.get("warnings", ())]
+        ground = seen.ground
+        unit = UNITS[draft.unit]
+        tracks, positions = _placed(seen, ground)
+        entities = _entities(tracks, positions, ground)
+        if isinstance(ground, NoGroundMap):
+            return GroundAnswer(
+                time_s=seen.frame.time_s, found=False, missing="", reason=ground.reason, warnings=warnings,
+                entities=entities,
+            )  # fmt: skip
+        watcher = build_watcher(seen.settings, self.film.detector)
+        watched = watcher.update(seen.frame, ground, tracks, positions)
+        top_px = ground.anchors_px if draft.ground == "reference" else np.zeros((0, 2))
+        return GroundAnswer(
+            time_s=seen.frame.time_s,
+            found=True,
+            missing="",
+            reason="",
+            method=ground.method,
+            solid_px=_solid_px(seen, ground, top_px),
+            corners_px=_pixels(top_px),
+            off_px=_off_px(draft, top_px, seen.frame.time_s),
+            camera_height_text=_camera_height(ground, unit),
+            contours=_contours(ground, self.film.size_px, unit),
+            watched=_watched(watched),
+            plan=_plan(_window(ground)),
+            entities=entities,
+            zones_px=[_ring_px(ground, np.array(zone.ring_m)) for zone in draft.zones if len(zone.ring_m) >= 2],
+            warnings=warnings,
+        )
+
+    def plan_jpeg(self, time_s: float, draft: Draft) -> bytes:
+        """Return the ground from above, as `GroundAnswer.plan` describes it.
+
+        Raises:
+            StandoffError: There is no map.
+        """
+        seen = self.see(time_s, draft)
+        if isinstance(seen.ground, NoGroundMap):
+            raise GroundError(expected="a ground map", found=seen.ground.reason, fix="click the reference's corners")
+        window = _window(seen.ground)
+        if window is None:
+            raise GroundError(expected="ground in the picture", found="none", fix="choose another picture")
+        onto = np.full((window.size_px[1], window.size_px[0], 3), 32, dtype=np.uint8)
+        rectify(seen.frame.image, seen.ground, window, onto)
+        return cv2.imencode(".jpg", onto, [cv2.IMWRITE_JPEG_QUALITY, 85])[1].tobytes()
+
+    def tape(self, time_s: float, draft: Draft, from_px: Pixel, to_px: Pixel) -> TapeAnswer:
+        """Measure a length on the ground.
+
+        Both ends share one map, and so most of its error. First order, as in METHOD.md's chapter on errors.
+
+        Raises:
+            StandoffError: The draft contradicts itself.
+        """
+        ground = None if draft.missing() else self.see(time_s, draft).ground
+        if ground is None or isinstance(ground, NoGroundMap):
+            return TapeAnswer(length_m=None, sigma_m=None)
+        ends_px = ground.undistorted(np.array([from_px, to_px]))
+        ends_m, on_ground = ground.to_ground(np.array([from_px, to_px]))
+        if not on_ground.all():
+            return TapeAnswer(length_m=None, sigma_m=None)
+        between = ends_m[1] - ends_m[0]
+        length_m = float(np.linalg.norm(between))
+        along = between / length_m if length_m > 0 else np.array([1.0, 0.0])
+        by_map = along @ np.subtract(*map_jacobian(ground, ends_px)[::-1])
+        by_clicks = along @ picture_jacobian(ground, ends_px)
+        variance = by_map @ ground.covariance @ by_map + _CLICK_SIGMA_PX**2 * float((by_clicks**2).sum())
+        sigma_m = float(np.sqrt(max(variance, 0.0)))
+        return TapeAnswer(
+            length_m=length_m,
+            sigma_m=sigma_m,
+            text=UNITS[draft.unit].distance(length_m, sigma_m),
+            from_m=_point(ends_m[0]),
+            to_m=_point(ends_m[1]),
+        )
+
+    def places(self, time_s: float, draft: Draft, at_px: list[Pixel]) -> list[tuple[float, float] | None]:
+        """Return where points of the picture are on the ground; None where they are not on it."""
+        ground = None if draft.missing() else self.see(time_s, draft).ground
+        if ground is None or isinstance(ground, NoGroundMap) or not at_px:
+            return [None] * len(at_px)
+        points_m, on_ground = ground.to_ground(np.array(at_px))
+        return [_point(point) if valid else None for point, valid in zip(points_m, on_ground, strict=True)]
+
+
+def laid_over(base: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
+    """Return settings by name with others in their place, section by section; what is None there is none."""
+    merged = dict(base)
+    for name, value in own.items():
+        before = merged.get(name)
+        merged[name] = laid_over(before, value) if isinstance(value, dict) and isinstance(before, dict) else value
+    return merged
+
+
+def _placed(seen: Seen, ground: AnyGround) -> tuple[Tracks, GroundPositions]:
+    """Take each thing that is seen for a track of its own, and place it."""
+    found = seen.detections
+    found = found[(found.score >= _SURE_SCORE) & ~np.isin(found.class_id, class_ids(Role.REFERENCE))]
+    count = len(found)
+    tracks = Tracks(
+        track_id=np.arange(count),
+        xyxy_px=found.xyxy_px,
+        score=found.score,
+        class_id=found.class_id,
+        observed=np.ones(count, dtype=np.bool_),
+        age_s=np.zeros(count),
+        foot_px=found.foot_px,
+        foot_covariance_px2=found.foot_covariance_px2,
+    )
+    return tracks, build_stage("locate", seen.settings).update(seen.frame.time_s, tracks, ground)
+
+
+def _window(ground: GroundMap) -> GroundWindow | None:
+    points_m = seen_ground_m(ground)
+    return window_around(points_m, (_PLAN_PX, _PLAN_PX), camera_up(ground)) if len(points_m) else None
+
+
+def _plan(window: GroundWindow | None) -> Plan | None:
+    if window is None:
+        return None
+    width, height = window.size_px
+    return Plan(width_px=width, height_px=height, m_per_px=window.m_per_px, to_plan=window.ground_to_window.tolist())
+
+
+def _camera_height(ground: GroundMap, unit: LengthUnit) -> str:
+    if ground.camera is None:
+        return ""
+    try:
+        return unit.length(float(view_from_homography(ground.image_to_ground, ground.camera).position_m[2]))
+    except GroundError:
+        return ""
+
+
+def _solid_px(seen: Seen, ground: GroundMap, top_px: FloatArray) -> list[list[Pixel]]:
+    """Return the outline of the reference's top as seen, of its foot as the map has it, and the edges between."""
+    reference = seen.settings.ground.reference
+    if reference is None or len(top_px) < 3:
+        return []
+    foot_px = np.array(_ring_px(ground, reference.shape().corners_m, steps=1))
+    lines = [_pixels(np.concatenate([top_px, top_px[:1]]))]
+    if len(foot_px) == len(top_px) + 1 and (reference.height_m or 0.0) > 0.0:
+        lines.append(_pixels(foot_px))
+        lines += [_pixels(np.array(edge)) for edge in zip(top_px, foot_px[:-1], strict=True)]
+    return lines
+
+
+def _off_px(draft: Draft, top_px: FloatArray, time_s: float) -> float | None:
+    clicked = np.array(draft.reference.corners_px)
+    if draft.ground != "reference" or len(top_px) != len(clicked) or abs(draft.reference.time_s - time_s) > 1e-3:
+        return None
+    away = np.linalg.norm(clicked[:, None] - top_px[None], axis=2)
+    return float(away.min(axis=1).max())
+
+
+def _contours(ground: GroundMap, size_px: tuple[int, int], unit: LengthUnit) -> list[Contour]:
+    """Return the lines in the picture along which a place is equally sure, worse beyond them."""
+    columns = np.linspace(0.0, size_px[0] - 1.0, _CONTOUR_CELLS)
+    rows = np.linspace(0.0, size_px[1] - 1.0, _CONTOUR_CELLS * size_px[1] // size_px[0])
+    at_px = np.stack(np.meshgrid(columns, rows), axis=2).reshape(-1, 2)
+    _, on_ground = ground.to_ground(at_px)
+    by_map = map_jacobian(ground, ground.undistorted(at_px))
+    covariance = by_map @ ground.covariance @ by_map.transpose(0, 2, 1)
+    half = (covariance[:, 0, 0] + covariance[:, 1, 1]) / 2.0
+    apart = np.hypot((covariance[:, 0, 0] - covariance[:, 1, 1]) / 2.0, covariance[:, 0, 1])
+    sigma_m = np.sqrt(half + apart)
+    # Beyond the horizon nothing is sure; a number so large that every line ends before it.
+    sigma_m = np.where(on_ground & np.isfinite(sigma_m), sigma_m, 1e3).reshape(len(rows), len(columns))
+    lines = contourpy.contour_generator(columns, rows, np.log(sigma_m))
+    found = ((level, lines.lines(float(np.log(level)))) for level in _LEVELS_M)
+    return [
+        Contour(sigma_m=level, text=unit.limit(level), lines_px=[_pixels(line) for line in parts])
+        for level, parts in found
+        if len(parts)
+    ]
+
+
+def _watched(watched: WatchedGround) -> Watched | None:
+    if not watched.judged:
+        return None
+    rows, columns = watched.cells.shape
+    return Watched(rows=rows, columns=columns, cells=watched.cells.tolist(), reasons=list(REASONS), share=watched.share)
+
+
+def _entities(tracks: Tracks, positions: GroundPositions, ground: AnyGround) -> list[Entity]:
+    entities = []
+    for row in range(len(tracks)):
+        is_placed = bool(positions.valid[row])
+        circle: list[Pixel] = []
+        if is_placed and isinstance(ground, GroundMap):
+            circle = _ring_px(ground, positions.xy_m[row] + positions.radius_m[row] * _CIRCLE[:-1], steps=1)
+        left, top, right, bottom = tracks.xyxy_px[row].tolist()
+        entities.append(
+            Entity(
+                kind=CLASSES[tracks.class_id[row]].name,
+                score=float(tracks.score[row]),
+                box_px=(left, top, right, bottom),
+                at_m=_point(positions.xy_m[row]) if is_placed else None,
+                circle_px=circle,
+            )
+        )
+    return entities
+
+
+def _ring_px(ground: GroundMap, ring_m: FloatArray, steps: int = _EDGE_STEPS) -> list[Pixel]:
+    """Return a closed ring on the ground as it is in the picture; its sides bend where the lens does."""
+    after = np.roll(ring_m, -1, axis=0)
+    shares = np.arange(steps) / steps
+    points_m = (ring_m[:, None] + shares[None, :, None] * (after - ring_m)[:, None]).reshape(-1, 2)
+    points_px, seen = ground.to_image(np.concatenate([points_m, points_m[:1]]))
+    return _pixels(points_px[seen])
+
+
+def _pixels(points_px: FloatArray) -> list[Pixel]:
+    return [(round(x, 2), round(y, 2)) for x, y in points_px.tolist()]
+
+
+def _point(point: FloatArray) -> tuple[float, float]:
+    return float(point[0]), float(point[1])
