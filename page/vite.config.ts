@@ -5,9 +5,10 @@ export default defineConfig({
   build: {
     outDir: "../src/standoff/service/page",
     emptyOutDir: true,
-    // Nothing inline: the page's policy runs files of its own address only.
+    // Nothing inline: the pages' policy runs files of their own address only.
     assetsInlineLimit: 0,
     modulePreload: { polyfill: false },
     target: "es2022",
+    rollupOptions: { input: ["setup.html", "review.html"] },
   },
 });

@@ -19,13 +19,14 @@ from standoff.core.homography import FloatArray
 from standoff.service.loopback import OpenPages
 from standoff.service.setup import open_setup, setup_app
 
-CONTRACT = Path(__file__).parents[2] / "page" / "openapi.json"
+CONTRACT = Path(__file__).parents[2] / "page" / "setup-api.json"
 
 
 @pytest.fixture
 def client(site_file: Path) -> Iterator[TestClient]:
-    page = open_setup(DEMO / "video.mp4", site_file, OpenPages())
-    yield TestClient(setup_app(page, None), raise_server_exceptions=True)
+    pages = OpenPages()
+    page = open_setup(DEMO / "video.mp4", site_file, pages)
+    yield TestClient(setup_app(page, pages, None), raise_server_exceptions=True)
     page.close()
 
 
@@ -36,7 +37,7 @@ def draft(corners_px: FloatArray) -> dict[str, Any]:
 
 
 def test_the_page_is_written_for_this_contract(client: TestClient) -> None:
-    """Its types are made from the file: `python -m standoff.service.contract`, then `npm run types`."""
+    """Its types are made from the file: `python -m standoff.service.contract page`, then `npm run types`."""
     assert client.get("/api/openapi.json").json() == json.loads(CONTRACT.read_text())
 
 

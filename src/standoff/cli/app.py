@@ -23,10 +23,10 @@ from standoff.cli import (
     join,
     label,
     marker,
+    page,
     quantize,
     run,
     schema,
-    setup,
     simulator,
     train,
     train_points,
@@ -57,7 +57,8 @@ app.command("demo")(demo.demo)
 app.command("bench")(bench.bench)
 app.command("doctor")(doctor.doctor)
 app.command("schema")(schema.schema)
-app.command("setup")(setup.setup)
+app.command("setup")(page.setup)
+app.command("open")(page.open_run)
 
 
 def _join_verbs() -> None:

@@ -41,10 +41,10 @@ def schema_of(columns: Sequence[Column], about: Mapping[str, str] | None = None)
     return pa.schema(fields, metadata=about)
 
 
-def column_names(table: pa.Table) -> frozenset[str]:
+def column_names(table: pa.Table | pa.Schema) -> frozenset[str]:
     """Return the names of a table's columns; none of them where one is no text, as in a damaged file."""
     try:
-        return frozenset(table.column_names)
+        return frozenset(table.names if isinstance(table, pa.Schema) else table.column_names)
     except UnicodeDecodeError:
         return frozenset()
 
@@ -54,7 +54,9 @@ def chosen_rows(columns: Columns, chosen: BoolArray | IntArray) -> Columns:
     return {name: column[chosen] for name, column in columns.items()}
 
 
-def read_columns(path: Path, names: Sequence[str], *, folder: str, fix: str) -> Columns:
+def read_columns(
+    path: Path, names: Sequence[str], *, folder: str, fix: str, span_s: tuple[float, float] | None = None
+) -> Columns:
     """Read columns of a Parquet table; numbers that are null are NaN, lists become arrays of objects.
 
     Args:
@@ -62,14 +64,18 @@ def read_columns(path: Path, names: Sequence[str], *, folder: str, fix: str) -> 
         names: Of the columns.
         folder: What it should be in, for messages.
         fix: What to do where it is not, for messages.
+        span_s: Of rows whose `time_s` is from this up to that, both included; None: all.
 
     Raises:
         DataError: The table is missing, unreadable, or lacks a column.
     """
     if not path.is_file():
         raise DataError(expected=f"{path.name} in {folder}", found=f"no {path}", fix=fix)
+    within = None if span_s is None else [("time_s", ">=", span_s[0]), ("time_s", "<=", span_s[1])]
     try:
-        table = pyarrow.parquet.read_table(path)
+        present = column_names(pyarrow.parquet.read_schema(path))
+        wanted = [name for name in names if name in present]
+        table = pyarrow.parquet.read_table(path, columns=wanted, filters=within)
     except (OSError, pa.ArrowException) as error:
         raise DataError(expected=f"a whole Parquet table in {path}", found=str(error), fix=fix) from error
     return columns_of(table, names, path, fix=fix)

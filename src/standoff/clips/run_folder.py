@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Final, Literal
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 
-from standoff.clips.columns import Columns, chosen_rows, read_columns
+from standoff.clips.columns import Columns, chosen_rows, column_names, read_columns
 from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.errors import DataError
+from standoff.core.hazard_life import HazardLife
 from standoff.core.hazards import Hazard
 from standoff.core.outputs import SCHEMA_VERSION
 from standoff.files.json_text import parse_json, read_json
@@ -59,18 +62,26 @@ class RunFolder:
             fix="use the version of standoff that made the run, or a newer one",
         )
 
-    def table(self, name: RunTable, columns: Sequence[str]) -> Columns:
+    def table(self, name: RunTable, columns: Sequence[str], span_s: tuple[float, float] | None = None) -> Columns:
         """Return columns of one of the tables; what was not measured is NaN.
 
         Args:
             name: Of the table.
             columns: Their names.
+            span_s: Of rows from this time up to that one, both included; None: all.
 
         Raises:
             DataError: The table is missing, unreadable, or lacks a column.
         """
         fix = f"repeat `standoff run` to its end with {name} among its outputs"
-        return read_columns(self.folder / f"{name}.parquet", columns, folder="the run folder", fix=fix)
+        return read_columns(self.folder / f"{name}.parquet", columns, folder="the run folder", fix=fix, span_s=span_s)
+
+    def columns(self, name: RunTable) -> frozenset[str]:
+        """Return the names of a table's columns: older runs have fewer; none where the table is missing or broken."""
+        try:
+            return column_names(pq.read_schema(self.folder / f"{name}.parquet"))
+        except (OSError, pa.ArrowException):
+            return frozenset()
 
     def tracks(self, columns: Sequence[str]) -> Columns:
         """Return columns of the tracks, frame by frame, and `class_id` as this version numbers classes.
@@ -99,18 +110,41 @@ class RunFolder:
         Raises:
             DataError: The file is missing or not what it should be.
         """
-        path = self.folder / _HAZARDS
         events: dict[int | None, list[Hazard]] = {}
+        for event, frame, _ in self._events():
+            events.setdefault(frame, []).append(event)
+        return events
+
+    def hazard_lives(self) -> list[HazardLife]:
+        """Return each hazard from its first event to its last, in the order in which they opened.
+
+        Its tracks are called by their classes, "unknown" where the run does not tell.
+
+        Raises:
+            DataError: The file is missing or not what it should be.
+        """
+        lives: dict[str, HazardLife] = {}
+        for event, frame, classes in self._events():
+            life = lives.get(event.hazard_id)
+            if life is None:
+                lives[event.hazard_id] = HazardLife.begun(event, classes, frame)
+            else:
+                life.take(event, frame)
+        return list(lives.values())
+
+    def _events(self) -> Iterator[tuple[Hazard, int | None, tuple[str, ...]]]:
+        """Yield each event, the frame after which it was said, and the classes of its tracks."""
+        path = self.folder / _HAZARDS
         lines = read_text(path, "a run's hazards", DataError).split("\n")
         for number, line in enumerate(filter(None, lines), start=1):
             told = parse_json(line, "a hazard's event", f"{path}, line {number}")
             try:
-                events.setdefault(told["frame"], []).append(_event(told))
-            except (KeyError, TypeError, ValueError) as error:
+                classes = told.get("classes") or [None] * len(told["track_ids"])
+                yield _event(told), told["frame"], tuple(name or "unknown" for name in classes)
+            except (AttributeError, KeyError, TypeError, ValueError) as error:
                 raise DataError(
                     expected="a hazard's event", found=f"{error} in {path}, line {number}", fix="repeat `standoff run`"
                 ) from error
-        return events
 
 
 def _event(told: Mapping[str, Any]) -> Hazard:

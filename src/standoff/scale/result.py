@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from statistics import fmean
@@ -11,8 +11,10 @@ from typing import Any, Final, Literal
 
 import pyarrow.parquet as pq
 
+from standoff.clips.run_folder import RunFolder
+from standoff.core.hazard_life import HazardLife
 from standoff.core.outputs import OUTPUTS, RECORD_FILE
-from standoff.files.json_text import parse_json, read_json
+from standoff.files.json_text import read_json
 
 _WORST: Final = 3
 """So many moments of a film are in the overview."""
@@ -123,33 +125,20 @@ def _watched_s(source: Mapping[str, Any]) -> float:
 
 def _worst(folder: Path) -> Iterator[Moment]:
     """Yield the gravest, then nearest moments of the hazards of a run."""
-    events = sorted(_worst_of_each(folder / OUTPUTS["hazards"]), key=lambda event: event[0].rank())
-    for moment, frame, track_ids in events[:_WORST]:
-        yield replace(moment, place_m=_middle_m(folder / OUTPUTS["tracks"], frame, track_ids))
+    lives = RunFolder(folder).hazard_lives() if (folder / OUTPUTS["hazards"]).is_file() else []
+    told = ((_moment(life), life) for life in lives if life.severity != "unknown")
+    for moment, life in sorted(told, key=lambda one: one[0].rank())[:_WORST]:
+        yield replace(moment, place_m=_middle_m(folder / OUTPUTS["tracks"], life.worst_frame, life.track_ids))
 
 
-def _worst_of_each(path: Path) -> Iterable[tuple[Moment, int, list[int]]]:
-    """Return the gravest, then nearest moment of each hazard of somebody in a file, its frame and its tracks."""
-    worst: dict[str, tuple[Moment, int, list[int]]] = {}
-    if not path.is_file():
-        return worst.values()
-    with path.open(encoding="utf-8") as lines:
-        for line in lines:
-            event = parse_json(line, "a hazard's event", str(path))
-            if event["severity"] == "unknown":
-                continue
-            gap_m = math.nan if event["gap_m"] is None else float(event["gap_m"])
-            between = " and ".join(filter(None, (*event.get("classes", ()), event.get("zone")))).replace("_", " ")
-            now = Moment(float(event["time_s"]), event["severity"], between, gap_m)
-            before = worst.get(event["hazard_id"])
-            if before is None or now.rank() < before[0].rank():
-                worst[event["hazard_id"]] = (now, event["frame"], event["track_ids"])
-    return worst.values()
+def _moment(life: HazardLife) -> Moment:
+    between = " and ".join(filter(None, (*life.names, life.zone))).replace("_", " ")
+    return Moment(life.worst_s, life.severity, between, life.worst_gap_m)
 
 
-def _middle_m(tracks: Path, frame: int, track_ids: Sequence[int]) -> tuple[float, float] | None:
+def _middle_m(tracks: Path, frame: int | None, track_ids: Sequence[int]) -> tuple[float, float] | None:
     """Return where some tracks are in a frame, on the mean; None where nothing says so of each of them."""
-    if not tracks.is_file() or not track_ids:
+    if frame is None or not tracks.is_file() or not track_ids:
         return None
     wanted = [("frame", "==", frame), ("track_id", "in", list(track_ids))]
     places = pq.read_table(tracks, columns=["x_m", "y_m"], filters=wanted).to_pydict()

@@ -1,4 +1,4 @@
-"""The page that a browser shows, where it was built."""
+"""The pages that a browser shows, where they were built."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from standoff.core.errors import MissingDependency
 
 
 def page_folder() -> Path:
-    """Return the folder of the built page.
+    """Return the folder of the built pages.
 
     Raises:
-        MissingDependency: standoff was installed where no Node was, so without it.
+        MissingDependency: standoff was installed where no Node was, so without them.
     """
     folder = Path(str(files("standoff"))) / "service" / "page"
-    if not (folder / "index.html").is_file():
+    if not (folder / "assets").is_dir():
         raise MissingDependency(
-            expected="the page, which is built when standoff is installed where Node is",
+            expected="the pages, which are built when standoff is installed where Node is",
             found=f"none in {folder}",
             fix="run `make page` in standoff's folder, which gets what it needs, and install standoff again",
         )

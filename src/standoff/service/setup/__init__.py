@@ -84,6 +84,6 @@ def serve_setup(film: Path, site_file: Path, port: int, tell: Callable[[str], No
     pages = OpenPages()
     page = open_setup(film, site_file, pages)
     try:
-        serve_page(setup_app(page, folder), pages, port, tell, opens_browser=opens_browser)
+        serve_page(setup_app(page, pages, folder), pages, port, tell, opens_browser=opens_browser)
     finally:
         page.close()

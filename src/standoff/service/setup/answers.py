@@ -4,21 +4,17 @@ from __future__ import annotations
 
 from typing import Literal, TypeAlias
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, Field
 
 from standoff.core.lengths import UnitName
+from standoff.service.answering import Told
 from standoff.service.setup.draft import Draft, Pixel
 
 Place = tuple[float, float]
 """Metres in the site frame."""
 
 
-class _Told(BaseModel):
-    # What has a default is always there when it is told.
-    model_config = ConfigDict(json_schema_serialization_defaults_required=True)
-
-
-class FilmAnswer(_Told):
+class FilmAnswer(Told):
     """The film."""
 
     name: str
@@ -30,7 +26,7 @@ class FilmAnswer(_Told):
     telemetry: str = Field(description="What tells of the drone, for people; empty: nothing.")
 
 
-class DraftAnswer(_Told):
+class DraftAnswer(Told):
     """The draft, and where it will be saved."""
 
     revision: int
@@ -46,7 +42,7 @@ class DraftChange(BaseModel):
     draft: Draft
 
 
-class RevisionAnswer(_Told):
+class RevisionAnswer(Told):
     """A draft was kept."""
 
     revision: int
@@ -59,7 +55,7 @@ class PointQuestion(BaseModel):
     at_px: Pixel
 
 
-class PointAnswer(_Told):
+class PointAnswer(Told):
     """A corner, or the point itself."""
 
     at_px: Pixel
@@ -74,14 +70,14 @@ class LengthQuestion(BaseModel):
     length_m: float | None = Field(default=None, allow_inf_nan=False, description="In place of `text`.")
 
 
-class LengthAnswer(_Told):
+class LengthAnswer(Told):
     """A length, and how it is written."""
 
     length_m: float
     text: str
 
 
-class Contour(_Told):
+class Contour(Told):
     """Where a place on the ground is this sure: rings in the picture."""
 
     sigma_m: float
@@ -89,7 +85,7 @@ class Contour(_Told):
     lines_px: list[list[Pixel]]
 
 
-class Entity(_Told):
+class Entity(Told):
     """Who or what the detector sees."""
 
     kind: str
@@ -99,7 +95,7 @@ class Entity(_Told):
     circle_px: list[Pixel] = Field(description="Its action radius on the ground, as it is in the picture.")
 
 
-class Plan(_Told):
+class Plan(Told):
     """The ground from above: how its picture lies in the site frame."""
 
     width_px: int
@@ -108,7 +104,7 @@ class Plan(_Told):
     to_plan: list[list[float]] = Field(description="3 x 3, from metres to pixels of the plan.")
 
 
-class Watched(_Told):
+class Watched(Told):
     """Which ground is watched, cell by cell."""
 
     rows: int
@@ -118,7 +114,7 @@ class Watched(_Told):
     share: float
 
 
-class GroundAnswer(_Told):
+class GroundAnswer(Told):
     """What a draft says of the ground in one picture."""
 
     time_s: float
@@ -152,7 +148,7 @@ class TapeQuestion(GroundQuestion):
     to_px: Pixel
 
 
-class TapeAnswer(_Told):
+class TapeAnswer(Told):
     """A length on the ground; null where one of the two is not on it, or there is no map."""
 
     length_m: float | None
@@ -168,7 +164,7 @@ class PlacesQuestion(GroundQuestion):
     at_px: list[Pixel]
 
 
-class PlacesAnswer(_Told):
+class PlacesAnswer(Told):
     """Their places; null where one is not on the ground."""
 
     at_m: list[Place | None]
@@ -185,7 +181,7 @@ class TrialQuestion(BaseModel):
 TrialState: TypeAlias = Literal["none", "running", "done", "failed", "stopped"]
 
 
-class TrialSummary(_Told):
+class TrialSummary(Told):
     """What came of a trial."""
 
     frames: int
@@ -197,7 +193,7 @@ class TrialSummary(_Told):
     warnings: list[str]
 
 
-class TrialAnswer(_Told):
+class TrialAnswer(Told):
     """How a trial goes."""
 
     state: TrialState
@@ -209,21 +205,13 @@ class TrialAnswer(_Told):
 
 
 class SaveQuestion(BaseModel):
-    """Write the settings; `overwrites` where a file is there that has other metres."""
+    """Write the settings."""
 
     draft: Draft
 
 
-class SaveAnswer(_Told):
+class SaveAnswer(Told):
     """What was written, and what to type next."""
 
     files: list[str]
     command: str
-
-
-class Problem(_Told):
-    """What is wrong, as the command line says it."""
-
-    expected: str
-    found: str
-    fix: str

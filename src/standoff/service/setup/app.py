@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import shlex
 from pathlib import Path
-from typing import Annotated, Any, Final, TypeAlias
+from typing import Annotated, Final
 
 from fastapi import FastAPI, HTTPException, Query, Request
-from fastapi.responses import FileResponse, JSONResponse, Response, StreamingResponse
-from fastapi.staticfiles import StaticFiles
+from fastapi.responses import FileResponse, JSONResponse, Response
 
-from standoff import __version__
-from standoff.core.errors import StandoffError
 from standoff.core.lengths import UNITS
+from standoff.service.answering import FILE, JPEG, PROBLEM, Responses, answering, show_page
 from standoff.service.loopback import OpenPages
 from standoff.service.setup.answers import (
     DraftAnswer,
@@ -26,7 +24,6 @@ from standoff.service.setup.answers import (
     PlacesQuestion,
     PointAnswer,
     PointQuestion,
-    Problem,
     RevisionAnswer,
     SaveAnswer,
     SaveQuestion,
@@ -41,11 +38,7 @@ from standoff.service.setup.sight import Sight
 from standoff.service.setup.site_file import save_site
 from standoff.service.setup.trial import SHOWN, Trial
 
-_Responses: TypeAlias = dict[int | str, dict[str, Any]]
-_JPEG: Final[_Responses] = {200: {"content": {"image/jpeg": {}}}}
-_FILE: Final[_Responses] = {200: {"content": {"application/octet-stream": {}}}, 404: {"description": "There is none."}}
-_PROBLEM: Final[_Responses] = {422: {"model": Problem, "description": "What is asked for cannot be."}}
-_STALE: Final[_Responses] = {409: {"model": RevisionAnswer, "description": "Another page has changed the draft."}}
+_STALE: Final[Responses] = {409: {"model": RevisionAnswer, "description": "Another page has changed the draft."}}
 
 _Time = Annotated[float, Query(ge=0, le=1e6, allow_inf_nan=False)]
 
@@ -165,48 +158,35 @@ class SetupPage:
             ),
         )
 
-    async def events(self) -> StreamingResponse:
-        """Tell the page when something has changed; while it listens, it is open."""
-        return StreamingResponse(self._pages.events(), media_type="text/event-stream")
 
-
-def setup_app(page: SetupPage, folder: Path | None) -> FastAPI:
+def setup_app(page: SetupPage, pages: OpenPages, folder: Path | None) -> FastAPI:
     """Return the application: one path for each question, and the page itself.
 
     Args:
         page: What answers.
+        pages: Which it counts.
         folder: Of the built page; None: the answers alone.
     """
-    app = FastAPI(
-        title="standoff setup", version=__version__, docs_url=None, redoc_url=None, openapi_url="/api/openapi.json"
-    )
-    app.add_exception_handler(StandoffError, _problem)
+    app = answering("standoff setup", pages)
     app.add_exception_handler(DraftStale, _stale)
     app.get("/api/film")(page.film)
-    app.get("/api/picture", responses=_JPEG | _PROBLEM, response_class=Response)(page.picture)
+    app.get("/api/picture", responses=JPEG | PROBLEM, response_class=Response)(page.picture)
     app.get("/api/draft")(page.draft)
-    app.put("/api/draft", responses=_STALE | _PROBLEM)(page.keep)
-    app.post("/api/corner", responses=_PROBLEM)(page.corner)
-    app.post("/api/ground", responses=_PROBLEM)(page.ground)
-    app.post("/api/plan", responses=_JPEG | _PROBLEM, response_class=Response)(page.plan)
-    app.post("/api/length", responses=_PROBLEM)(page.length)
-    app.post("/api/tape", responses=_PROBLEM)(page.tape)
-    app.post("/api/places", responses=_PROBLEM)(page.places)
+    app.put("/api/draft", responses=_STALE | PROBLEM)(page.keep)
+    app.post("/api/corner", responses=PROBLEM)(page.corner)
+    app.post("/api/ground", responses=PROBLEM)(page.ground)
+    app.post("/api/plan", responses=JPEG | PROBLEM, response_class=Response)(page.plan)
+    app.post("/api/length", responses=PROBLEM)(page.length)
+    app.post("/api/tape", responses=PROBLEM)(page.tape)
+    app.post("/api/places", responses=PROBLEM)(page.places)
     app.get("/api/trial")(page.trial)
-    app.post("/api/trial", responses=_PROBLEM)(page.begin_trial)
+    app.post("/api/trial", responses=PROBLEM)(page.begin_trial)
     app.delete("/api/trial")(page.stop_trial)
-    app.get("/api/trial/{number}/{name}", responses=_FILE, response_class=FileResponse)(page.of_trial)
-    app.post("/api/save", responses=_PROBLEM)(page.save)
-    app.get("/api/events", response_class=StreamingResponse)(page.events)
+    app.get("/api/trial/{number}/{name}", responses=FILE, response_class=FileResponse)(page.of_trial)
+    app.post("/api/save", responses=PROBLEM)(page.save)
     if folder is not None:
-        app.mount("/", StaticFiles(directory=folder, html=True))
+        show_page(app, folder, "setup")
     return app
-
-
-def _problem(_request: Request, error: Exception) -> Response:
-    assert isinstance(error, StandoffError)
-    problem = Problem(expected=error.expected, found=error.found, fix=error.fix)
-    return JSONResponse(problem.model_dump(), status_code=422)
 
 
 def _stale(_request: Request, error: Exception) -> Response:

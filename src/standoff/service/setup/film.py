@@ -1,39 +1,32 @@
-"""Single pictures of a film, by their time."""
+"""The film that is set up: who is found in its pictures, and where corners are."""
 
 from __future__ import annotations
 
 import threading
 from collections import OrderedDict
-from contextlib import suppress
-from dataclasses import asdict
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import cv2
 import numpy as np
 
 from standoff.config import Settings, build_stage
-from standoff.core.camera import CameraPrior
-from standoff.core.errors import SourceError
 from standoff.core.protocols import Detector
 from standoff.core.types import Detections, Frame
-from standoff.stages.frames import open_source
+from standoff.service.pictures import FilmPictures
 
-_KEPT: Final = 6
-_EARLIER_S: Final = (0.0, 0.5, 2.0)
-_JPEG_QUALITY: Final = 88
+_LOOKS_KEPT: Final = 6
 _SNAP_PX: Final = 7
 _CORNER_PX: Final = 4
 _QUALITY: Final = 0.3
 """How far from a click a corner is looked for, half of the window that places it, its least share of the strongest."""
 
 
-class Film:
+class Film(FilmPictures):
     """The film that is set up: its pictures, and who is found in them.
 
-    Pictures are kept for as long as somebody may look at them again, and what was found in them likewise: both take
-    longer than a hand that drags a corner would wait.
+    What was found is kept likewise: looking takes longer than a hand that drags a corner would wait.
 
     Args:
         path: Video file, or folder of pictures.
@@ -44,65 +37,10 @@ class Film:
     """
 
     def __init__(self, path: Path, settings: Settings) -> None:
-        self.path = path
+        super().__init__(path, settings.source)
         self._settings = settings
-        with open_source(path, **asdict(settings.source)) as source:
-            self.size_px = source.size_px
-            self.camera_prior: CameraPrior = source.camera_prior
-            self.about: dict[str, Any] = source.describe()
-            first = next(iter(source.frames()))
-            count = source.frame_count
-        self.first_s = first.time_s
-        self.last_s = self._last_s(count)
-        self._lock = threading.Lock()
-        self._frames: OrderedDict[float, Frame] = OrderedDict([(first.time_s, first)])
-        self._asked: dict[float, float] = {first.time_s: first.time_s}
-        self._found: dict[float, Detections] = {}
-
-    def _last_s(self, count: int | None) -> float:
-        """Return about when the last picture is: what the header says."""
-        rate = self.about.get("fps") or self._settings.source.fps
-        return self.first_s + (count - 1) / rate if count and rate else self.first_s
-
-    def frame(self, time_s: float) -> Frame:
-        """Return the first picture at or after a time, or the last one.
-
-        Raises:
-            SourceError: It cannot be read.
-        """
-        time_s = round(min(max(time_s, self.first_s), self.last_s), 3)
-        with self._lock:
-            known = self._asked.get(time_s)
-            if known is not None and known in self._frames:
-                self._frames.move_to_end(known)
-                return self._frames[known]
-            frame = self._read(time_s)
-            self._asked[time_s] = frame.time_s
-            self._frames[frame.time_s] = frame
-            while len(self._frames) > _KEPT:
-                gone, _ = self._frames.popitem(last=False)
-                self._found.pop(gone, None)
-            return frame
-
-    def _read(self, time_s: float) -> Frame:
-        # Where the header promises more than there is, the last picture is looked for a little earlier.
-        for earlier_s in (*_EARLIER_S, time_s - self.first_s):
-            wanted = {"start_s": max(time_s - earlier_s, 0.0), "stop_s": None, "every": 1}
-            with suppress(SourceError), open_source(self.path, **asdict(self._settings.source) | wanted) as source:
-                frame = next(iter(source.frames()))
-                # Converted while the film is open, and once.
-                frame.picture.bgr()
-                return frame
-        raise SourceError(
-            expected=f"a picture in {self.path}", found="none any more", fix="look whether the film is still there"
-        )
-
-    def jpeg(self, time_s: float) -> tuple[bytes, Frame]:
-        """Return a picture for people, and which it is."""
-        frame = self.frame(time_s)
-        coded, jpeg = cv2.imencode(".jpg", frame.image, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
-        assert coded
-        return jpeg.tobytes(), frame
+        self._looking = threading.Lock()
+        self._found: OrderedDict[float, Detections] = OrderedDict()
 
     @cached_property
     def detector(self) -> Detector:
@@ -121,10 +59,13 @@ class Film:
         Raises:
             ModelError: It cannot be used.
         """
-        with self._lock:
+        with self._looking:
             known = self._found.get(frame.time_s)
             if known is None:
                 known = self._found[frame.time_s] = self.detector.detect(frame)
+            self._found.move_to_end(frame.time_s)
+            if len(self._found) > _LOOKS_KEPT:
+                self._found.popitem(last=False)
             return known
 
 

@@ -12,7 +12,6 @@ from tempfile import TemporaryDirectory
 from typing import Any, Final
 
 import contourpy
-import cv2
 import numpy as np
 
 from standoff.config import Settings, build_ground, build_stage, build_watcher, settings_from
@@ -37,6 +36,7 @@ from standoff.core.watched_ground import REASONS
 from standoff.drawing.ground_window import GroundWindow, camera_up, rectify, seen_ground_m, window_around
 from standoff.files.yaml_text import write_yaml
 from standoff.files.zone_file import write_zones
+from standoff.service.pictures import jpeg_of
 from standoff.service.setup.answers import (
     Contour,
     Entity,
@@ -54,6 +54,7 @@ _SURE_SCORE: Final = 0.3
 _LEVELS_M: Final = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0)
 _CONTOUR_CELLS: Final = 64
 _PLAN_PX: Final = 560
+_PLAN_QUALITY: Final = 85
 _CLICK_SIGMA_PX: Final = 1.0
 """How well a hand with a magnifier puts a point of the tape."""
 _TURNS: Final = np.linspace(0.0, 2.0 * np.pi, 49)
@@ -205,7 +206,7 @@ class Sight:
             raise GroundError(expected="ground in the picture", found="none", fix="choose another picture")
         onto = np.full((window.size_px[1], window.size_px[0], 3), 32, dtype=np.uint8)
         rectify(seen.frame.image, seen.ground, window, onto)
-        return cv2.imencode(".jpg", onto, [cv2.IMWRITE_JPEG_QUALITY, 85])[1].tobytes()
+        return jpeg_of(onto, _PLAN_QUALITY)
 
     def tape(self, time_s: float, draft: Draft, from_px: Pixel, to_px: Pixel) -> TapeAnswer:
         """Measure a length on the ground.

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
-from standoff.core.hazards import Pair, worse
+from standoff.core.hazard_life import HazardLife
+from standoff.core.hazards import Pair
 from standoff.core.lengths import UNITS
-from standoff.core.types import Frame, FrameResult, GroundMap, Hazard, ImageArray, NoGroundMap, Severity
+from standoff.core.types import Frame, FrameResult, GroundMap, Hazard, ImageArray, NoGroundMap
 from standoff.core.zones import Zone
 from standoff.stages.sinks.blurring import PeopleWatch, blur
 from standoff.stages.sinks.frame_measurements import FrameMeasurements
@@ -20,52 +20,6 @@ from standoff.stages.sinks.worst_moments import WorstMoments
 _MOST_HAZARDS = 5000
 _MOST_PATHS = 150
 _BACKGROUND_WIDTH_PX = 960
-
-
-@dataclass(slots=True)
-class HazardLife:
-    """One hazard from its first event to its last.
-
-    Attributes:
-        rule: "proximity", "zone" or "measurement".
-        names: What its tracks are called.
-        zone: Name of the zone; empty where it is of none.
-        opened_s: Time of the first event.
-        closed_s: Time of the last; None while open.
-        severity: The gravest it had.
-        distance_m: The smallest measured; NaN when none was.
-        gap_m: Its gap.
-        sigma_m: Its standard error.
-        reason: Why it was unknown or why it closed.
-    """
-
-    rule: str
-    names: tuple[str, ...]
-    opened_s: float
-    severity: Severity
-    closed_s: float | None = None
-    distance_m: float = float("nan")
-    gap_m: float = float("nan")
-    sigma_m: float = float("nan")
-    reason: str = ""
-    zone: str = ""
-
-    @property
-    def who(self) -> str:
-        """Whom it is about, for people."""
-        who = " and ".join(self.names) or "whole picture"
-        if self.zone:
-            return f"{who}: zone {self.zone}"
-        return who if self.rule == "proximity" else f"{who} ({self.rule})"
-
-    def lasted_s(self, last_s: float) -> float:
-        """Return how long it was open, up to the run's last frame."""
-        return (self.closed_s if self.closed_s is not None else last_s) - self.opened_s
-
-    def measure(self, distance_m: float, gap_m: float, sigma_m: float) -> None:
-        """Take a measurement; the smallest counts."""
-        if np.isfinite(gap_m) and not gap_m >= self.gap_m:
-            self.distance_m, self.gap_m, self.sigma_m = distance_m, gap_m, sigma_m
 
 
 class RunSummary:
@@ -182,10 +136,9 @@ class RunSummary:
         for event in events:
             if event.hazard_id not in self.hazards and len(self.hazards) < _MOST_HAZARDS:
                 called = tuple(names.get(track_id, f"track {track_id}") for track_id in event.track_ids)
-                self.hazards[event.hazard_id] = HazardLife(
-                    event.rule, called, event.time_s, event.severity, zone=event.zone
-                )
-            self.take_event(event)
+                self.hazards[event.hazard_id] = HazardLife.begun(event, called)
+            else:
+                self.take_event(event)
         pairs = measurements.proximities
         if not measurements.hazards:
             return
@@ -210,8 +163,4 @@ class RunSummary:
         if life is None:
             self.hazards_left_out += int(event.phase == "opened")
             return
-        life.severity = worse(life.severity, event.severity)
-        life.measure(event.distance_m, event.gap_m, event.sigma_m)
-        life.reason = event.reason or life.reason
-        if event.phase == "closed":
-            life.closed_s = event.time_s
+        life.take(event)

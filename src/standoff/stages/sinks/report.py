@@ -15,13 +15,14 @@ from markupsafe import Markup
 
 from standoff import __version__
 from standoff.core.durations import minutes_text
+from standoff.core.hazard_life import HazardLife
 from standoff.core.outputs import ASSISTANCE
 from standoff.core.types import FrameResult, Outcome
 from standoff.core.zones import NOT_PLACED, ZONE_WORDS, Zone
 from standoff.drawing.page_template import page_template
 from standoff.files.json_text import plain
 from standoff.files.whole import partial_file
-from standoff.stages.sinks.collect import HazardLife, RunSummary
+from standoff.stages.sinks.collect import RunSummary
 from standoff.stages.sinks.params import ReportParams, ShowParams
 
 _MOST_ROWS = 200

@@ -3,7 +3,7 @@
 import { css, html, nothing } from "lit";
 import { customElement } from "lit/decorators.js";
 import "./basis-panel";
-import { Part } from "./part";
+import { SetupPart } from "./setup-part";
 import "./picture-view";
 import "./plan-view";
 import type { UnitName } from "./questions";
@@ -11,45 +11,16 @@ import "./radii-panel";
 import "./result-panel";
 import "./save-panel";
 import "./trial-panel";
-import { LANGUAGES, type Language } from "./words";
+import { frameLook, languageChoice } from "../shared/page-frame";
+import type { Language } from "../shared/words";
 import "./zones-panel";
 
 @customElement("setup-page")
-export class SetupPage extends Part {
+export class SetupPage extends SetupPart {
   static override styles = [
-    ...Part.styles,
+    ...SetupPart.styles,
+    frameLook,
     css`
-      header {
-        display: flex;
-        flex-wrap: wrap;
-        gap: 0.4rem 1.2rem;
-        align-items: center;
-        padding: 0.6rem 1rem;
-        background: var(--panel);
-        border-bottom: 1px solid var(--line);
-      }
-      h1 {
-        font-size: 1.1rem;
-        margin: 0 auto 0 0;
-      }
-      header label {
-        margin: 0;
-      }
-      main {
-        display: grid;
-        grid-template-columns: minmax(0, 1fr) 22rem;
-        gap: 1rem;
-        padding: 1rem;
-        max-width: 112rem;
-        margin: 0 auto;
-      }
-      section {
-        background: var(--panel);
-        border: 1px solid var(--line);
-        border-radius: 10px;
-        padding: 0.8rem;
-        margin-bottom: 0.8rem;
-      }
       .time {
         display: flex;
         gap: 0.8rem;
@@ -64,13 +35,7 @@ export class SetupPage extends Part {
         grid-template-columns: minmax(0, 1fr) minmax(0, 1fr);
         gap: 0.8rem;
       }
-      .notice {
-        padding: 0.5rem 1rem;
-        background: var(--panel);
-        border-bottom: 2px solid var(--bad);
-      }
       @media (max-width: 60rem) {
-        main,
         .below {
           grid-template-columns: minmax(0, 1fr);
         }
@@ -81,12 +46,6 @@ export class SetupPage extends Part {
   override connectedCallback(): void {
     super.connectedCallback();
     void this.site.open();
-  }
-
-  private speak(language: Language): void {
-    localStorage.setItem("standoff-language", language);
-    document.documentElement.lang = language;
-    this.language = language;
   }
 
   override render() {
@@ -100,12 +59,7 @@ export class SetupPage extends Part {
             ${(["metres", "feet"] as const).map((unit) => html`<option value=${unit} ?selected=${site.draft?.unit === unit}>${this.say(unit)}</option>`)}
           </select>
         </label>
-        <label>
-          ${this.say("language")}
-          <select name="language" @change=${(event: Event) => this.speak((event.target as HTMLSelectElement).value as Language)}>
-            ${Object.entries(LANGUAGES).map(([name, one]) => html`<option value=${name} ?selected=${name === language}>${one.name}</option>`)}
-          </select>
-        </label>
+        ${languageChoice(language, (chosen: Language) => (this.language = chosen))}
       </header>
       <div role="alert">
         ${site.isOffline ? html`<p class="notice wrong">${this.say("offline")}</p>` : nothing}

@@ -3,9 +3,9 @@
 import { html, nothing } from "lit";
 import { customElement, state } from "lit/decorators.js";
 import "./length-field";
-import { Part } from "./part";
+import { SetupPart } from "./setup-part";
 import type { Draft } from "./questions";
-import type { Word } from "./words";
+import type { Word } from "../shared/words";
 
 type Shape = Draft["reference"]["shape"];
 const LENGTHS: Record<Shape, Word[]> = {
@@ -25,7 +25,7 @@ const SHAPES: [Shape, Word][] = [
 ];
 
 @customElement("basis-panel")
-export class BasisPanel extends Part {
+export class BasisPanel extends SetupPart {
   @state() private pasted = "";
   @state() private inDegrees = false;
 
@@ -47,8 +47,6 @@ export class BasisPanel extends Part {
       </fieldset>
     `;
   }
-
-  static override styles = [...Part.styles];
 
   private reference(draft: Draft) {
     const { reference } = draft;

@@ -3,11 +3,11 @@
 import { html, nothing } from "lit";
 import { customElement } from "lit/decorators.js";
 import "./length-field";
-import { Part } from "./part";
-import type { Word } from "./words";
+import { SetupPart } from "./setup-part";
+import type { Word } from "../shared/words";
 
 @customElement("radii-panel")
-export class RadiiPanel extends Part {
+export class RadiiPanel extends SetupPart {
   override render() {
     const draft = this.site.draft;
     if (!draft) return nothing;
@@ -32,6 +32,4 @@ export class RadiiPanel extends Part {
       </details>
     `;
   }
-
-  static override styles = [...Part.styles];
 }

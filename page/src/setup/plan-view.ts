@@ -2,16 +2,16 @@
 
 import { css, html, nothing, svg } from "lit";
 import { customElement } from "lit/decorators.js";
-import { Part } from "./part";
+import { SetupPart } from "./setup-part";
 import type { Pixel } from "./questions";
 
 const BAR_SHARE = 0.3;
 const ROUND_M = [0.5, 1, 2, 5, 10, 20, 50, 100];
 
 @customElement("plan-view")
-export class PlanView extends Part {
+export class PlanView extends SetupPart {
   static override styles = [
-    ...Part.styles,
+    ...SetupPart.styles,
     css`
       svg {
         display: block;

@@ -2,7 +2,7 @@
 
 import { css, html, nothing, svg, type SVGTemplateResult } from "lit";
 import { customElement, query, state } from "lit/decorators.js";
-import { Part } from "./part";
+import { SetupPart } from "./setup-part";
 import { ask, type GroundAnswer, type Pixel } from "./questions";
 
 const CLICK_MOVES_PX = 4;
@@ -21,9 +21,9 @@ const ARROWS: Record<string, Pixel> = {
 type Grip = { kind: "corner" | "point"; index: number };
 
 @customElement("picture-view")
-export class PictureView extends Part {
+export class PictureView extends SetupPart {
   static override styles = [
-    ...Part.styles,
+    ...SetupPart.styles,
     css`
       .bar {
         display: flex;

@@ -2,10 +2,10 @@
 
 import { html, nothing } from "lit";
 import { customElement } from "lit/decorators.js";
-import { Part } from "./part";
+import { SetupPart } from "./setup-part";
 
 @customElement("result-panel")
-export class ResultPanel extends Part {
+export class ResultPanel extends SetupPart {
   override render() {
     const { ground, isLooking, tape, tapeEnds } = this.site;
     return html`

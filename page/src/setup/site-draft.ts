@@ -1,7 +1,8 @@
 /** What the page knows: the draft, the picture that is looked at, and what the server says of both. */
 
-import type { ReactiveController, ReactiveControllerHost } from "lit";
-import { ask, Refused, type Draft, type FilmAnswer, type GroundAnswer, type Pixel, type TapeAnswer, type TrialAnswer } from "./questions";
+import { Refused } from "../shared/asking";
+import { Knowledge } from "../shared/part";
+import { ask, type Draft, type FilmAnswer, type GroundAnswer, type Pixel, type TapeAnswer, type TrialAnswer } from "./questions";
 
 const KEEP_AFTER_MS = 300;
 const TRIAL_LOOKS_MS = 500;
@@ -9,7 +10,7 @@ const TRIAL_LOOKS_MS = 500;
 export type Tool = "corners" | "tape" | "zone";
 
 /** One state for all parts of the page; whoever changes it tells everybody. */
-export class SiteDraft extends EventTarget {
+export class SiteDraft extends Knowledge {
   film?: FilmAnswer;
   draft?: Draft;
   siteFile = "";
@@ -24,9 +25,7 @@ export class SiteDraft extends EventTarget {
   tape?: TapeAnswer;
   openZone: Pixel[] = [];
   trial: TrialAnswer = { state: "none", number: 0, frames: 0, frames_expected: null, message: "", summary: null };
-  problem = "";
   isStale = false;
-  isOffline = false;
   savedAs: { files: string[]; command: string } | undefined;
 
   private revision = 0;
@@ -172,52 +171,9 @@ export class SiteDraft extends EventTarget {
     this.tellAll();
   }
 
-  /** The server hears that the page is open, and the page that the server is. */
-  private listen(): void {
-    const events = new EventSource("/api/events");
-    events.addEventListener("open", () => {
-      this.isOffline = false;
-      this.tellAll();
-    });
-    events.addEventListener("error", () => {
-      this.isOffline = true;
-      this.tellAll();
-    });
-  }
-
-  private async trying(work: () => Promise<void>): Promise<void> {
-    try {
-      this.problem = "";
-      await work();
-    } catch (error) {
-      if (error instanceof Refused && error.status === 409) this.isStale = true;
-      else this.problem = error instanceof Error ? error.message : String(error);
-      this.tellAll();
-    }
-  }
-
-  tellAll(): void {
-    this.dispatchEvent(new Event("change"));
-  }
-}
-
-/** Draws a part of the page again whenever the state has changed. */
-export class Watching implements ReactiveController {
-  private readonly again = () => this.host.requestUpdate();
-
-  constructor(
-    private readonly host: ReactiveControllerHost,
-    private readonly site: () => SiteDraft,
-  ) {
-    host.addController(this);
-  }
-
-  hostConnected(): void {
-    this.site().addEventListener("change", this.again);
-  }
-
-  hostDisconnected(): void {
-    this.site().removeEventListener("change", this.again);
+  protected override refused(error: unknown): void {
+    if (error instanceof Refused && error.status === 409) this.isStale = true;
+    else super.refused(error);
   }
 }
 

@@ -2,14 +2,14 @@
 
 import { html, nothing } from "lit";
 import { customElement } from "lit/decorators.js";
-import { Part } from "./part";
+import { SetupPart } from "./setup-part";
 import type { Draft } from "./questions";
 
 type Kind = Draft["zones"][number]["kind"];
 const KINDS: Kind[] = ["no_go", "machine_only", "crossing"];
 
 @customElement("zones-panel")
-export class ZonesPanel extends Part {
+export class ZonesPanel extends SetupPart {
   override render() {
     const draft = this.site.draft;
     if (!draft) return nothing;

@@ -2,11 +2,11 @@
 
 import { html } from "lit";
 import { customElement, property, state } from "lit/decorators.js";
-import { Part } from "./part";
+import { SetupPart } from "./setup-part";
 import { ask } from "./questions";
 
 @customElement("length-field")
-export class LengthField extends Part {
+export class LengthField extends SetupPart {
   @property() label = "";
   @property() name = "";
   @property({ attribute: false }) lengthM: number | null = null;

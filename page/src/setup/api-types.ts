@@ -4,50 +4,6 @@
  */
 
 export interface paths {
-    "/api/corner": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
-        /**
-         * Corner
-         * @description Which corner of edges is near a point?
-         */
-        post: operations["corner_api_corner_post"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/api/draft": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        /**
-         * Draft
-         * @description How far is the draft?
-         */
-        get: operations["draft_api_draft_get"];
-        /**
-         * Keep
-         * @description Keep a new draft.
-         */
-        put: operations["keep_api_draft_put"];
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
     "/api/events": {
         parameters: {
             query?: never;
@@ -88,46 +44,6 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/api/ground": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
-        /**
-         * Ground
-         * @description What does a draft say of the ground in the picture at a time?
-         */
-        post: operations["ground_api_ground_post"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/api/length": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
-        /**
-         * Length
-         * @description Which length does somebody mean?
-         */
-        post: operations["length_api_length_post"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
     "/api/picture": {
         parameters: {
             query?: never;
@@ -148,7 +64,31 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/api/places": {
+    "/api/draft": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Draft
+         * @description How far is the draft?
+         */
+        get: operations["draft_api_draft_get"];
+        /**
+         * Keep
+         * @description Keep a new draft.
+         */
+        put: operations["keep_api_draft_put"];
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/corner": {
         parameters: {
             query?: never;
             header?: never;
@@ -158,10 +98,30 @@ export interface paths {
         get?: never;
         put?: never;
         /**
-         * Places
-         * @description Where on the ground are points of the picture?
+         * Corner
+         * @description Which corner of edges is near a point?
          */
-        post: operations["places_api_places_post"];
+        post: operations["corner_api_corner_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/ground": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Ground
+         * @description What does a draft say of the ground in the picture at a time?
+         */
+        post: operations["ground_api_ground_post"];
         delete?: never;
         options?: never;
         head?: never;
@@ -188,7 +148,7 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/api/save": {
+    "/api/length": {
         parameters: {
             query?: never;
             header?: never;
@@ -198,10 +158,10 @@ export interface paths {
         get?: never;
         put?: never;
         /**
-         * Save
-         * @description Write the settings.
+         * Length
+         * @description Which length does somebody mean?
          */
-        post: operations["save_api_save_post"];
+        post: operations["length_api_length_post"];
         delete?: never;
         options?: never;
         head?: never;
@@ -222,6 +182,26 @@ export interface paths {
          * @description How far is it between two points of the picture?
          */
         post: operations["tape_api_tape_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/places": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Places
+         * @description Where on the ground are points of the picture?
+         */
+        post: operations["places_api_places_post"];
         delete?: never;
         options?: never;
         head?: never;
@@ -276,6 +256,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/save": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Save
+         * @description Write the settings.
+         */
+        post: operations["save_api_save_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
 }
 export type webhooks = Record<string, never>;
 export interface components {
@@ -285,15 +285,15 @@ export interface components {
          * @description Where a place on the ground is this sure: rings in the picture.
          */
         Contour: {
+            /** Sigma M */
+            sigma_m: number;
+            /** Text */
+            text: string;
             /** Lines Px */
             lines_px: [
                 number,
                 number
             ][][];
-            /** Sigma M */
-            sigma_m: number;
-            /** Text */
-            text: string;
         };
         /**
          * Draft
@@ -306,6 +306,10 @@ export interface components {
              * @enum {string}
              */
             ground: "reference" | "survey" | "auto";
+            reference?: components["schemas"]["ReferenceDraft-Input"];
+            survey?: components["schemas"]["SurveyDraft-Input"];
+            /** Zones */
+            zones?: components["schemas"]["ZoneDraft"][];
             /**
              * Radius M
              * @description By class, where not the usual one.
@@ -313,16 +317,12 @@ export interface components {
             radius_m?: {
                 [key: string]: number;
             };
-            reference?: components["schemas"]["ReferenceDraft-Input"];
-            survey?: components["schemas"]["SurveyDraft-Input"];
             /**
              * Unit
              * @default metres
              * @enum {string}
              */
             unit: "metres" | "feet";
-            /** Zones */
-            zones?: components["schemas"]["ZoneDraft"][];
         };
         /**
          * Draft
@@ -335,6 +335,10 @@ export interface components {
              * @enum {string}
              */
             ground: "reference" | "survey" | "auto";
+            reference: components["schemas"]["ReferenceDraft-Output"];
+            survey: components["schemas"]["SurveyDraft-Output"];
+            /** Zones */
+            zones: components["schemas"]["ZoneDraft"][];
             /**
              * Radius M
              * @description By class, where not the usual one.
@@ -342,25 +346,21 @@ export interface components {
             radius_m: {
                 [key: string]: number;
             };
-            reference: components["schemas"]["ReferenceDraft-Output"];
-            survey: components["schemas"]["SurveyDraft-Output"];
             /**
              * Unit
              * @default metres
              * @enum {string}
              */
             unit: "metres" | "feet";
-            /** Zones */
-            zones: components["schemas"]["ZoneDraft"][];
         };
         /**
          * DraftAnswer
          * @description The draft, and where it will be saved.
          */
         DraftAnswer: {
-            draft: components["schemas"]["Draft-Output"];
             /** Revision */
             revision: number;
+            draft: components["schemas"]["Draft-Output"];
             /** Site File */
             site_file: string;
             /** Usual Radius M */
@@ -373,23 +373,19 @@ export interface components {
          * @description A new draft in place of the one of a revision.
          */
         DraftChange: {
-            draft: components["schemas"]["Draft-Input"];
             /** Revision */
             revision: number;
+            draft: components["schemas"]["Draft-Input"];
         };
         /**
          * Entity
          * @description Who or what the detector sees.
          */
         Entity: {
-            /**
-             * At M
-             * @description Where it stands; null: not known.
-             */
-            at_m: [
-                number,
-                number
-            ] | null;
+            /** Kind */
+            kind: string;
+            /** Score */
+            score: number;
             /** Box Px */
             box_px: [
                 number,
@@ -398,6 +394,14 @@ export interface components {
                 number
             ];
             /**
+             * At M
+             * @description Where it stands; null: not known.
+             */
+            at_m: [
+                number,
+                number
+            ] | null;
+            /**
              * Circle Px
              * @description Its action radius on the ground, as it is in the picture.
              */
@@ -405,80 +409,54 @@ export interface components {
                 number,
                 number
             ][];
-            /** Kind */
-            kind: string;
-            /** Score */
-            score: number;
         };
         /**
          * FilmAnswer
          * @description The film.
          */
         FilmAnswer: {
-            /** First S */
-            first_s: number;
-            /** Fps */
-            fps: number | null;
-            /** Height Px */
-            height_px: number;
-            /** Last S */
-            last_s: number;
             /** Name */
             name: string;
+            /** Width Px */
+            width_px: number;
+            /** Height Px */
+            height_px: number;
+            /** First S */
+            first_s: number;
+            /** Last S */
+            last_s: number;
+            /** Fps */
+            fps: number | null;
             /**
              * Telemetry
              * @description What tells of the drone, for people; empty: nothing.
              */
             telemetry: string;
-            /** Width Px */
-            width_px: number;
         };
         /**
          * GroundAnswer
          * @description What a draft says of the ground in one picture.
          */
         GroundAnswer: {
-            /**
-             * Camera Height Text
-             * @description Above the ground; empty: not known.
-             * @default
-             */
-            camera_height_text: string;
-            /** Contours */
-            contours: components["schemas"]["Contour"][];
-            /**
-             * Corners Px
-             * @description Its top's corners, as found.
-             */
-            corners_px: [
-                number,
-                number
-            ][];
-            /** Entities */
-            entities: components["schemas"]["Entity"][];
+            /** Time S */
+            time_s: number;
             /** Found */
             found: boolean;
-            /**
-             * Method
-             * @default
-             */
-            method: string;
             /**
              * Missing
              * @description What is still to be clicked or typed; empty: nothing.
              */
             missing: string;
             /**
-             * Off Px
-             * @description How far the clicked corners are from them, at most.
-             */
-            off_px: number | null;
-            plan: components["schemas"]["Plan"] | null;
-            /**
              * Reason
              * @description Why there is no map; empty: there is one.
              */
             reason: string;
+            /**
+             * Method
+             * @default
+             */
+            method: string;
             /**
              * Solid Px
              * @description The reference as it is taken to be: lines.
@@ -487,14 +465,31 @@ export interface components {
                 number,
                 number
             ][][];
-            /** Time S */
-            time_s: number;
             /**
-             * Warnings
-             * @description What contradicts what.
+             * Corners Px
+             * @description Its top's corners, as found.
              */
-            warnings: string[];
+            corners_px: [
+                number,
+                number
+            ][];
+            /**
+             * Off Px
+             * @description How far the clicked corners are from them, at most.
+             */
+            off_px: number | null;
+            /**
+             * Camera Height Text
+             * @description Above the ground; empty: not known.
+             * @default
+             */
+            camera_height_text: string;
+            /** Contours */
+            contours: components["schemas"]["Contour"][];
             watched: components["schemas"]["Watched"] | null;
+            plan: components["schemas"]["Plan"] | null;
+            /** Entities */
+            entities: components["schemas"]["Entity"][];
             /**
              * Zones Px
              * @description As drawn on the ground, one ring a zone.
@@ -503,15 +498,20 @@ export interface components {
                 number,
                 number
             ][][];
+            /**
+             * Warnings
+             * @description What contradicts what.
+             */
+            warnings: string[];
         };
         /**
          * GroundQuestion
          * @description What does a draft say of the ground in the picture at a time?
          */
         GroundQuestion: {
-            draft: components["schemas"]["Draft-Input"];
             /** Time S */
             time_s: number;
+            draft: components["schemas"]["Draft-Input"];
         };
         /** HTTPValidationError */
         HTTPValidationError: {
@@ -534,10 +534,10 @@ export interface components {
          */
         LengthQuestion: {
             /**
-             * Length M
-             * @description In place of `text`.
+             * Unit
+             * @enum {string}
              */
-            length_m?: number | null;
+            unit: "metres" | "feet";
             /**
              * Text
              * @description As typed; a bare number is in `unit`.
@@ -545,10 +545,10 @@ export interface components {
              */
             text: string;
             /**
-             * Unit
-             * @enum {string}
+             * Length M
+             * @description In place of `text`.
              */
-            unit: "metres" | "feet";
+            length_m?: number | null;
         };
         /**
          * PlacesAnswer
@@ -566,20 +566,22 @@ export interface components {
          * @description Where on the ground are points of the picture?
          */
         PlacesQuestion: {
+            /** Time S */
+            time_s: number;
+            draft: components["schemas"]["Draft-Input"];
             /** At Px */
             at_px: [
                 number,
                 number
             ][];
-            draft: components["schemas"]["Draft-Input"];
-            /** Time S */
-            time_s: number;
         };
         /**
          * Plan
          * @description The ground from above: how its picture lies in the site frame.
          */
         Plan: {
+            /** Width Px */
+            width_px: number;
             /** Height Px */
             height_px: number;
             /** M Per Px */
@@ -589,8 +591,6 @@ export interface components {
              * @description 3 x 3, from metres to pixels of the plan.
              */
             to_plan: number[][];
-            /** Width Px */
-            width_px: number;
         };
         /**
          * PointAnswer
@@ -610,11 +610,18 @@ export interface components {
          * @description A surveyed point: where it is in the picture, and on the site.
          */
         "PointDraft-Input": {
+            /** Name */
+            name: string;
             /**
              * At Px
              * @description null: not clicked yet.
              */
             at_px?: [
+                number,
+                number
+            ] | null;
+            /** M */
+            m?: [
                 number,
                 number
             ] | null;
@@ -626,13 +633,6 @@ export interface components {
                 number,
                 number
             ] | null;
-            /** M */
-            m?: [
-                number,
-                number
-            ] | null;
-            /** Name */
-            name: string;
             /** Z M */
             z_m?: number | null;
         };
@@ -641,11 +641,18 @@ export interface components {
          * @description A surveyed point: where it is in the picture, and on the site.
          */
         "PointDraft-Output": {
+            /** Name */
+            name: string;
             /**
              * At Px
              * @description null: not clicked yet.
              */
             at_px: [
+                number,
+                number
+            ] | null;
+            /** M */
+            m: [
                 number,
                 number
             ] | null;
@@ -657,13 +664,6 @@ export interface components {
                 number,
                 number
             ] | null;
-            /** M */
-            m: [
-                number,
-                number
-            ] | null;
-            /** Name */
-            name: string;
             /** Z M */
             z_m: number | null;
         };
@@ -672,13 +672,13 @@ export interface components {
          * @description Which corner is near a point of a picture?
          */
         PointQuestion: {
+            /** Time S */
+            time_s: number;
             /** At Px */
             at_px: [
                 number,
                 number
             ];
-            /** Time S */
-            time_s: number;
         };
         /**
          * Problem
@@ -687,37 +687,37 @@ export interface components {
         Problem: {
             /** Expected */
             expected: string;
-            /** Fix */
-            fix: string;
             /** Found */
             found: string;
+            /** Fix */
+            fix: string;
         };
         /**
          * ReferenceDraft
          * @description The reference object: four corners of its top, clicked in order, and what was measured of it.
          */
         "ReferenceDraft-Input": {
-            /** Corners Px */
-            corners_px?: [
-                number,
-                number
-            ][];
-            /**
-             * Height M
-             * @description Of its top; null: estimated.
-             */
-            height_m?: number | null;
-            /**
-             * Lengths M
-             * @description As `shape` wants them; null: not typed.
-             */
-            lengths_m?: (number | null)[];
             /**
              * Shape
              * @default square
              * @enum {string}
              */
             shape: "square" | "rectangle" | "sides";
+            /**
+             * Lengths M
+             * @description As `shape` wants them; null: not typed.
+             */
+            lengths_m?: (number | null)[];
+            /**
+             * Height M
+             * @description Of its top; null: estimated.
+             */
+            height_m?: number | null;
+            /** Corners Px */
+            corners_px?: [
+                number,
+                number
+            ][];
             /**
              * Time S
              * @description Of the picture in which they were clicked.
@@ -730,27 +730,27 @@ export interface components {
          * @description The reference object: four corners of its top, clicked in order, and what was measured of it.
          */
         "ReferenceDraft-Output": {
-            /** Corners Px */
-            corners_px: [
-                number,
-                number
-            ][];
-            /**
-             * Height M
-             * @description Of its top; null: estimated.
-             */
-            height_m: number | null;
-            /**
-             * Lengths M
-             * @description As `shape` wants them; null: not typed.
-             */
-            lengths_m: (number | null)[];
             /**
              * Shape
              * @default square
              * @enum {string}
              */
             shape: "square" | "rectangle" | "sides";
+            /**
+             * Lengths M
+             * @description As `shape` wants them; null: not typed.
+             */
+            lengths_m: (number | null)[];
+            /**
+             * Height M
+             * @description Of its top; null: estimated.
+             */
+            height_m: number | null;
+            /** Corners Px */
+            corners_px: [
+                number,
+                number
+            ][];
             /**
              * Time S
              * @description Of the picture in which they were clicked.
@@ -771,14 +771,14 @@ export interface components {
          * @description What was written, and what to type next.
          */
         SaveAnswer: {
-            /** Command */
-            command: string;
             /** Files */
             files: string[];
+            /** Command */
+            command: string;
         };
         /**
          * SaveQuestion
-         * @description Write the settings; `overwrites` where a file is there that has other metres.
+         * @description Write the settings.
          */
         SaveQuestion: {
             draft: components["schemas"]["Draft-Input"];
@@ -814,11 +814,6 @@ export interface components {
          * @description A length on the ground; null where one of the two is not on it, or there is no map.
          */
         TapeAnswer: {
-            /** From M */
-            from_m: [
-                number,
-                number
-            ] | null;
             /** Length M */
             length_m: number | null;
             /** Sigma M */
@@ -828,6 +823,11 @@ export interface components {
              * @default
              */
             text: string;
+            /** From M */
+            from_m: [
+                number,
+                number
+            ] | null;
             /** To M */
             to_m: [
                 number,
@@ -839,14 +839,14 @@ export interface components {
          * @description How far is it between two points of the picture?
          */
         TapeQuestion: {
+            /** Time S */
+            time_s: number;
             draft: components["schemas"]["Draft-Input"];
             /** From Px */
             from_px: [
                 number,
                 number
             ];
-            /** Time S */
-            time_s: number;
             /** To Px */
             to_px: [
                 number,
@@ -859,6 +859,17 @@ export interface components {
          */
         TrialAnswer: {
             /**
+             * State
+             * @enum {string}
+             */
+            state: "none" | "running" | "done" | "failed" | "stopped";
+            /**
+             * Number
+             * @description Of the trial; rises with each.
+             * @default 0
+             */
+            number: number;
+            /**
              * Frames
              * @default 0
              */
@@ -870,17 +881,6 @@ export interface components {
              * @default
              */
             message: string;
-            /**
-             * Number
-             * @description Of the trial; rises with each.
-             * @default 0
-             */
-            number: number;
-            /**
-             * State
-             * @enum {string}
-             */
-            state: "none" | "running" | "done" | "failed" | "stopped";
             summary: components["schemas"]["TrialSummary"] | null;
         };
         /**
@@ -888,26 +888,30 @@ export interface components {
          * @description Run some seconds with a draft.
          */
         TrialQuestion: {
-            draft: components["schemas"]["Draft-Input"];
+            /** Time S */
+            time_s: number;
             /**
              * Lasts S
              * @default 10
              */
             lasts_s: number;
-            /** Time S */
-            time_s: number;
+            draft: components["schemas"]["Draft-Input"];
         };
         /**
          * TrialSummary
          * @description What came of a trial.
          */
         TrialSummary: {
-            /** Distances */
-            distances: number;
             /** Frames */
             frames: number;
             /** Frames With Map */
             frames_with_map: number;
+            /** Distances */
+            distances: number;
+            /** Measured Distances */
+            measured_distances: number;
+            /** Watched Share */
+            watched_share: number | null;
             /**
              * Hazards
              * @description How many of each severity.
@@ -915,42 +919,38 @@ export interface components {
             hazards: {
                 [key: string]: number;
             };
-            /** Measured Distances */
-            measured_distances: number;
             /** Warnings */
             warnings: string[];
-            /** Watched Share */
-            watched_share: number | null;
         };
         /** ValidationError */
         ValidationError: {
-            /** Context */
-            ctx?: Record<string, never>;
-            /** Input */
-            input?: unknown;
             /** Location */
             loc: (string | number)[];
             /** Message */
             msg: string;
             /** Error Type */
             type: string;
+            /** Input */
+            input?: unknown;
+            /** Context */
+            ctx?: Record<string, never>;
         };
         /**
          * Watched
          * @description Which ground is watched, cell by cell.
          */
         Watched: {
+            /** Rows */
+            rows: number;
+            /** Columns */
+            columns: number;
             /**
              * Cells
              * @description -1: no ground; 0: watched; else a number of `reasons`.
              */
             cells: number[][];
-            /** Columns */
-            columns: number;
             /** Reasons */
             reasons: string[];
-            /** Rows */
-            rows: number;
             /** Share */
             share: number;
         };
@@ -959,13 +959,13 @@ export interface components {
          * @description A part of the site with a rule of its own.
          */
         ZoneDraft: {
+            /** Name */
+            name: string;
             /**
              * Kind
              * @enum {string}
              */
             kind: "no_go" | "machine_only" | "crossing";
-            /** Name */
-            name: string;
             /** Ring M */
             ring_m: [
                 number,
@@ -981,18 +981,32 @@ export interface components {
 }
 export type $defs = Record<string, never>;
 export interface operations {
-    corner_api_corner_post: {
+    events_api_events_get: {
         parameters: {
             query?: never;
             header?: never;
             path?: never;
             cookie?: never;
         };
-        requestBody: {
-            content: {
-                "application/json": components["schemas"]["PointQuestion"];
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
         };
+    };
+    film_api_film_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
@@ -1000,7 +1014,29 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["PointAnswer"];
+                    "application/json": components["schemas"]["FilmAnswer"];
+                };
+            };
+        };
+    };
+    picture_api_picture_get: {
+        parameters: {
+            query: {
+                time_s: number;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "image/jpeg": unknown;
                 };
             };
             /** @description What is asked for cannot be. */
@@ -1076,32 +1112,18 @@ export interface operations {
             };
         };
     };
-    events_api_events_get: {
+    corner_api_corner_post: {
         parameters: {
             query?: never;
             header?: never;
             path?: never;
             cookie?: never;
         };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content?: never;
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["PointQuestion"];
             };
         };
-    };
-    film_api_film_get: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
         responses: {
             /** @description Successful Response */
             200: {
@@ -1109,7 +1131,16 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["FilmAnswer"];
+                    "application/json": components["schemas"]["PointAnswer"];
+                };
+            };
+            /** @description What is asked for cannot be. */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
                 };
             };
         };
@@ -1134,103 +1165,6 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["GroundAnswer"];
-                };
-            };
-            /** @description What is asked for cannot be. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["Problem"];
-                };
-            };
-        };
-    };
-    length_api_length_post: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody: {
-            content: {
-                "application/json": components["schemas"]["LengthQuestion"];
-            };
-        };
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["LengthAnswer"];
-                };
-            };
-            /** @description What is asked for cannot be. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["Problem"];
-                };
-            };
-        };
-    };
-    picture_api_picture_get: {
-        parameters: {
-            query: {
-                time_s: number;
-            };
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "image/jpeg": unknown;
-                };
-            };
-            /** @description What is asked for cannot be. */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["Problem"];
-                };
-            };
-        };
-    };
-    places_api_places_post: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody: {
-            content: {
-                "application/json": components["schemas"]["PlacesQuestion"];
-            };
-        };
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["PlacesAnswer"];
                 };
             };
             /** @description What is asked for cannot be. */
@@ -1277,7 +1211,7 @@ export interface operations {
             };
         };
     };
-    save_api_save_post: {
+    length_api_length_post: {
         parameters: {
             query?: never;
             header?: never;
@@ -1286,7 +1220,7 @@ export interface operations {
         };
         requestBody: {
             content: {
-                "application/json": components["schemas"]["SaveQuestion"];
+                "application/json": components["schemas"]["LengthQuestion"];
             };
         };
         responses: {
@@ -1296,7 +1230,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["SaveAnswer"];
+                    "application/json": components["schemas"]["LengthAnswer"];
                 };
             };
             /** @description What is asked for cannot be. */
@@ -1330,6 +1264,39 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["TapeAnswer"];
+                };
+            };
+            /** @description What is asked for cannot be. */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    places_api_places_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["PlacesQuestion"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["PlacesAnswer"];
                 };
             };
             /** @description What is asked for cannot be. */
@@ -1451,6 +1418,39 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    save_api_save_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["SaveQuestion"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SaveAnswer"];
+                };
+            };
+            /** @description What is asked for cannot be. */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Problem"];
                 };
             };
         };

@@ -1,5 +1,6 @@
 /** The server's questions; their types are made from its own description of them. */
 
+import { answered, asked, askedPicture } from "../shared/asking";
 import type { components } from "./api-types";
 
 type Schemas = components["schemas"];
@@ -17,35 +18,6 @@ export type TrialAnswer = Schemas["TrialAnswer"];
 export type UnitName = Draft["unit"];
 export type Pixel = [number, number];
 
-/** What the server refuses, in its own words. */
-export class Refused extends Error {
-  constructor(
-    readonly status: number,
-    message: string,
-  ) {
-    super(message);
-  }
-}
-
-async function answered(path: string, method: string, question?: unknown): Promise<Response> {
-  const request: RequestInit = { method };
-  if (question !== undefined) {
-    request.headers = { "Content-Type": "application/json" };
-    request.body = JSON.stringify(question);
-  }
-  const answer = await fetch(path, request);
-  if (!answer.ok) {
-    const problem = (await answer.json().catch(() => ({}))) as Partial<Schemas["Problem"]>;
-    const said = problem.expected ? `expected ${problem.expected}, found ${problem.found}. ${problem.fix}.` : answer.statusText;
-    throw new Refused(answer.status, said);
-  }
-  return answer;
-}
-
-async function asked<Answer>(path: string, method: string, question?: unknown): Promise<Answer> {
-  return (await (await answered(path, method, question)).json()) as Answer;
-}
-
 export const ask = {
   film: () => asked<FilmAnswer>("/api/film", "GET"),
   draft: () => asked<DraftAnswer>("/api/draft", "GET"),
@@ -62,9 +34,6 @@ export const ask = {
   beginTrial: (time_s: number, draft: Draft) => asked<TrialAnswer>("/api/trial", "POST", { time_s, draft }),
   stopTrial: () => asked<TrialAnswer>("/api/trial", "DELETE"),
   save: (draft: Draft) => asked<SaveAnswer>("/api/save", "POST", { draft }),
-  picture: async (time_s: number): Promise<{ picture: Blob; time_s: number }> => {
-    const answer = await answered(`/api/picture?time_s=${time_s}`, "GET");
-    return { picture: await answer.blob(), time_s: Number(answer.headers.get("X-Time-S")) };
-  },
+  picture: askedPicture,
   plan: async (time_s: number, draft: Draft) => (await answered("/api/plan", "POST", { time_s, draft })).blob(),
 };

@@ -2,12 +2,12 @@
 
 import { css, html, nothing } from "lit";
 import { customElement } from "lit/decorators.js";
-import { Part } from "./part";
+import { SetupPart } from "./setup-part";
 
 @customElement("trial-panel")
-export class TrialPanel extends Part {
+export class TrialPanel extends SetupPart {
   static override styles = [
-    ...Part.styles,
+    ...SetupPart.styles,
     css`
       video,
       progress {

@@ -2,10 +2,10 @@
 
 import { html, nothing } from "lit";
 import { customElement } from "lit/decorators.js";
-import { Part } from "./part";
+import { SetupPart } from "./setup-part";
 
 @customElement("save-panel")
-export class SavePanel extends Part {
+export class SavePanel extends SetupPart {
   override render() {
     const { siteFile, savedAs, ground, draft } = this.site;
     if (!draft) return nothing;
