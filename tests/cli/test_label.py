@@ -9,6 +9,8 @@ import pytest
 from cli.calling import Call
 from square_detector import draw_squares, write_detector
 
+from standoff.clips.reviews import Review, add_review
+
 
 @pytest.fixture
 def pictures(tmp_path: Path) -> Path:
@@ -72,3 +74,19 @@ def test_bad_input_of_label_leaves_no_folder(call: Call, pictures: Path, tmp_pat
         assert (code, out, err.count("\n")) == (2, "", 1), err
         assert told in err
         assert not (tmp_path / "out").exists()
+
+
+def test_what_was_called_a_false_alarm_comes_first(call: Call, pictures: Path, tmp_path: Path) -> None:
+    model, run = write_detector(tmp_path), tmp_path / "run"
+    run.mkdir()
+    words = ("label", pictures, "--fps", 1, "--model", model, "--frames", 3, "--every", 5, "--review", run)
+    code, _, err = call(*words, "--out", tmp_path / "none")
+    assert code == 2 and "false alarms" in err and "standoff open" in err
+    for hazard_id, verdict, time_s in (("a", "false_alarm", 7.0), ("b", "right", 9.0), ("c", "false_alarm", 13.0)):
+        add_review(run, Review(hazard_id, verdict, time_s, "a\nlorry" if hazard_id == "a" else ""))  # type: ignore[arg-type]
+    add_review(run, Review("c", "unsure", 13.0))
+    code, out, err = call(*words, "--out", tmp_path / "out")
+    assert code == 0, err
+    names = {path.name for path in (tmp_path / "out" / "images").iterdir()}
+    assert "pictures_000007.jpg" in names and "pictures_000013.jpg" not in names and len(names) == 3
+    assert "false alarm" in out

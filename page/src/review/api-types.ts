@@ -182,6 +182,11 @@ export interface components {
             reason: string;
             /** Watched Share */
             watched_share: number | null;
+            /**
+             * Is Moved
+             * @description Places are counted from elsewhere than in the frame before.
+             */
+            is_moved: boolean;
             /** Tracks */
             tracks: components["schemas"]["TrackAt"][];
             /** Pairs */

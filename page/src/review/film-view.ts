@@ -8,7 +8,8 @@ import { clock, ReviewPart, TONES } from "./review-part";
 
 type Pixel = [number, number];
 const SPEEDS = [0.25, 0.5, 1, 2, 4];
-const TEXT_SHARE = 0.019;
+const TEXT_SHARE = 0.015;
+const LETTER_SHARE = 0.55;
 
 @customElement("film-view")
 export class FilmView extends ReviewPart {
@@ -208,6 +209,7 @@ export class FilmView extends ReviewPart {
   private overlays(frame: FrameAt, widthPx: number): SVGTemplateResult {
     const size = TEXT_SHARE * widthPx;
     const thin = widthPx / 900;
+    const labels = new Labels(size, widthPx);
     return svg`
       ${frame.tracks.map((one) => {
         const tone = TONES[one.severity ?? "none"];
@@ -217,24 +219,45 @@ export class FilmView extends ReviewPart {
           <polyline points=${ring} fill="none" stroke="#000" stroke-opacity="0.5" stroke-width=${4 * thin}></polyline>
           <polyline points=${ring} fill=${tone} fill-opacity="0.12" stroke=${tone} stroke-width=${2 * thin}></polyline>
           <rect x=${left} y=${top} width=${right - left} height=${bottom - top} fill="none" stroke=${tone} stroke-width=${1.5 * thin} stroke-dasharray=${one.is_seen ? "" : `${6 * thin} ${4 * thin}`}></rect>
-          ${this.label([left, top - size / 3], `${this.say(one.kind as Word)} ${one.track_id}`, size)}
         `;
       })}
       ${frame.pairs.map((one) => {
         if (!one.ends_px) return nothing;
         const [[x1, y1], [x2, y2]] = one.ends_px as [Pixel, Pixel];
-        const said = one.severity ? `${one.text} · ${this.say(one.severity)}` : one.text;
         return svg`
           <line x1=${x1} y1=${y1} x2=${x2} y2=${y2} stroke="#000" stroke-opacity="0.5" stroke-width=${4 * thin}></line>
           <line x1=${x1} y1=${y1} x2=${x2} y2=${y2} stroke=${TONES[one.severity ?? "none"]} stroke-width=${(one.severity ? 2.5 : 1) * thin}></line>
-          ${this.label([(x1 + x2) / 2, (y1 + y2) / 2], said, size, "middle")}
         `;
+      })}
+      ${frame.pairs.map((one) => {
+        if (!one.ends_px) return nothing;
+        const [[x1, y1], [x2, y2]] = one.ends_px as [Pixel, Pixel];
+        return labels.put([(x1 + x2) / 2, (y1 + y2) / 2], one.severity ? `${one.text} · ${this.say(one.severity)}` : one.text);
+      })}
+      ${frame.tracks.map((one) => {
+        const [left, top, right] = one.box_px as [number, number, number, number];
+        return labels.put([(left + right) / 2, top - size / 3], `${this.say(one.kind as Word)} ${one.track_id}`);
       })}
     `;
   }
+}
 
-  private label(at: Pixel, text: string, size: number, anchor = "start"): SVGTemplateResult {
-    return svg`<text x=${at[0]} y=${at[1]} font-size=${size} stroke-width=${size / 4} text-anchor=${anchor}>${text}</text>`;
+/** Texts in the picture; one that would lie over another is left out, those put first stay. */
+class Labels {
+  private readonly taken: [number, number, number, number][] = [];
+
+  constructor(
+    private readonly size: number,
+    private readonly widthPx: number,
+  ) {}
+
+  put(at: Pixel, text: string): SVGTemplateResult | typeof nothing {
+    const half = (LETTER_SHARE * this.size * text.length) / 2;
+    const x = Math.min(Math.max(at[0], half), this.widthPx - half);
+    const box: [number, number, number, number] = [x - half, at[1] - this.size, x + half, at[1]];
+    if (this.taken.some(([left, top, right, bottom]) => box[0] < right && left < box[2] && box[1] < bottom && top < box[3])) return nothing;
+    this.taken.push(box);
+    return svg`<text x=${x} y=${at[1]} font-size=${this.size} stroke-width=${this.size / 4} text-anchor="middle">${text}</text>`;
   }
 }
 

@@ -25,12 +25,12 @@ export class HazardList extends ReviewPart {
         list-style: none;
         margin: 0.4rem 0;
         padding: 0;
-        max-height: 22rem;
+        max-height: 26rem;
         overflow-y: auto;
       }
       li button {
         display: grid;
-        grid-template-columns: 4.2rem 5.2rem minmax(0, 1fr) 1rem;
+        grid-template-columns: 4rem 6.2rem minmax(0, 1fr) 1rem;
         gap: 0.5rem;
         width: 100%;
         text-align: left;

@@ -1,6 +1,6 @@
 /** The page of a finished run: film, plan and curves, and beside them the hazards. */
 
-import { css, html, nothing } from "lit";
+import { html, nothing } from "lit";
 import { customElement } from "lit/decorators.js";
 import { frameLook, languageChoice } from "../shared/page-frame";
 import type { Language, Word } from "../shared/words";
@@ -12,15 +12,7 @@ import "./run-plan";
 
 @customElement("review-page")
 export class ReviewPage extends ReviewPart {
-  static override styles = [
-    ...ReviewPart.styles,
-    frameLook,
-    css`
-      main {
-        grid-template-columns: minmax(0, 1fr) 26rem;
-      }
-    `,
-  ];
+  static override styles = [...ReviewPart.styles, frameLook];
 
   override connectedCallback(): void {
     super.connectedCallback();
@@ -42,12 +34,14 @@ export class ReviewPage extends ReviewPart {
       <main>
         <div>
           <section><film-view .language=${language}></film-view></section>
-          <section><run-curves .language=${language}></run-curves></section>
+          <div class="below">
+            <section><run-curves .language=${language}></run-curves></section>
+            <section><run-plan .language=${language}></run-plan></section>
+          </div>
         </div>
         <div>
           <section>${this.about()}</section>
           <section><hazard-list .language=${language}></hazard-list></section>
-          <section><run-plan .language=${language}></run-plan></section>
         </div>
       </main>
     `;

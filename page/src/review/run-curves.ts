@@ -6,7 +6,7 @@ import uPlot from "uplot";
 import plotLook from "uplot/dist/uPlot.min.css?inline";
 import { clock, ReviewPart } from "./review-part";
 
-const HEIGHT_PX = 130;
+const HEIGHT_PX = 120;
 
 @customElement("run-curves")
 export class RunCurves extends ReviewPart {
@@ -15,8 +15,8 @@ export class RunCurves extends ReviewPart {
     unsafeCSS(plotLook),
     css`
       .plot {
-        min-height: ${HEIGHT_PX}px;
-        margin-bottom: 0.4rem;
+        height: ${HEIGHT_PX}px;
+        margin-bottom: 0.6rem;
       }
     `,
   ];
@@ -46,15 +46,13 @@ export class RunCurves extends ReviewPart {
 
   override updated(): void {
     const { curves } = this.view;
-    const state = `${this.language}`;
-    if (curves && this.drawnFor !== state && this.gapPlace && this.watchedPlace) {
-      this.drawnFor = state;
+    if (curves && this.drawnFor !== curves && this.gapPlace && this.watchedPlace) {
+      this.drawnFor = curves;
       for (const plot of this.plots) plot.destroy();
-      const { run } = this.view;
       const watched = curves.watched.map((one) => (one === null ? null : 100 * one));
       this.plots = [
-        this.plot(this.gapPlace, this.say("curveGap", { unit: run!.unit }), curves.time_s, curves.gap, "--accent"),
-        this.plot(this.watchedPlace, this.say("curveWatched"), curves.time_s, watched, "--good", [0, 100]),
+        this.plot(this.gapPlace, curves.time_s, curves.gap, "--accent"),
+        this.plot(this.watchedPlace, curves.time_s, watched, "--good", [0, 100]),
       ];
     }
     for (const plot of this.plots) plot.redraw(false);
@@ -64,7 +62,7 @@ export class RunCurves extends ReviewPart {
     for (const plot of this.plots) plot.setSize({ width: this.clientWidth, height: HEIGHT_PX });
   }
 
-  private plot(place: HTMLElement, name: string, times: number[], values: (number | null)[], tone: string, range?: [number, number]): uPlot {
+  private plot(place: HTMLElement, times: number[], values: (number | null)[], tone: string, range?: [number, number]): uPlot {
     const colour = (variable: string) => getComputedStyle(this).getPropertyValue(variable).trim();
     const axis = { stroke: colour("--ink"), grid: { stroke: colour("--line"), width: 1 }, ticks: { stroke: colour("--line") } };
     const options: uPlot.Options = {
@@ -75,7 +73,7 @@ export class RunCurves extends ReviewPart {
       scales: { x: { time: false }, ...(range ? { y: { range } } : {}) },
       axes: [
         { ...axis, values: (_, ticks) => ticks.map(clock) },
-        { ...axis, size: 60, label: name, labelSize: 18, labelFont: "12px system-ui" },
+        { ...axis, size: 46 },
       ],
       series: [{}, { stroke: colour(tone), width: 1.5, spanGaps: false, points: { show: times.length < 60 } }],
       hooks: { draw: [(plot) => this.mark(plot, colour("--bad"))] },
@@ -112,7 +110,9 @@ export class RunCurves extends ReviewPart {
     const least = known.length ? known.reduce((a, b) => Math.min(a, b)).toFixed(1) : "–";
     return html`
       <h2>${this.say("curves")}</h2>
+      <p class="quiet" aria-hidden="true">${this.say("curveGap", { unit: run.unit })}</p>
       <div class="plot" id="gap" role="img" aria-label=${known.length ? this.say("curveSays", { least, unit: run.unit }) : this.say("curveNone")}></div>
+      <p class="quiet" aria-hidden="true">${this.say("curveWatched")}</p>
       <div class="plot" id="watched" role="img" aria-label=${this.say("curveWatched")}></div>
     `;
   }

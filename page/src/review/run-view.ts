@@ -58,7 +58,9 @@ export class RunView extends Knowledge {
   /** The frames just before the time, the latest last. */
   before(lastsS: number): FrameAt[] {
     const all = [...this.spanAt(this.timeS - SPAN_S), ...this.spanAt(this.timeS)];
-    return all.filter((one) => one.time_s > this.timeS - lastsS && one.time_s <= this.timeS + SAME_S);
+    const recent = all.filter((one) => one.time_s > this.timeS - lastsS && one.time_s <= this.timeS + SAME_S);
+    // What was counted from elsewhere is no way that somebody went.
+    return recent.slice(Math.max(0, recent.map((one) => one.is_moved).lastIndexOf(true)));
   }
 
   /** The time of the picture after this one, or before it. */

@@ -30,16 +30,6 @@ export class SetupPage extends SetupPart {
         flex: 1;
         accent-color: var(--accent);
       }
-      .below {
-        display: grid;
-        grid-template-columns: minmax(0, 1fr) minmax(0, 1fr);
-        gap: 0.8rem;
-      }
-      @media (max-width: 60rem) {
-        .below {
-          grid-template-columns: minmax(0, 1fr);
-        }
-      }
     `,
   ];
 

@@ -10,6 +10,18 @@ export const controls = css`
     font-size: 1rem;
     margin: 0 0 0.4rem;
   }
+  summary {
+    cursor: pointer;
+  }
+  summary h2 {
+    display: inline;
+  }
+  fieldset {
+    border: 0;
+    margin: 0;
+    padding: 0;
+    min-width: 0;
+  }
   p {
     margin: 0.3rem 0;
   }

@@ -22,7 +22,7 @@ export const frameLook = css`
   }
   main {
     display: grid;
-    grid-template-columns: minmax(0, 1fr) 22rem;
+    grid-template-columns: minmax(0, 1fr) 24rem;
     gap: 1rem;
     padding: 1rem;
     max-width: 112rem;
@@ -41,9 +41,15 @@ export const frameLook = css`
     background: var(--panel);
     border-bottom: 2px solid var(--bad);
   }
+  .below {
+    display: grid;
+    grid-template-columns: minmax(0, 1fr) minmax(0, 1fr);
+    gap: 0.8rem;
+  }
   @media (max-width: 60rem) {
-    main {
-      grid-template-columns: minmax(0, 1fr) !important;
+    main,
+    .below {
+      grid-template-columns: minmax(0, 1fr);
     }
   }
 `;

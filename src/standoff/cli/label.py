@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from textwrap import shorten
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 if TYPE_CHECKING:
     from standoff.training.frame_selection import LabelReport
+
+_LONGEST_REASON = 60
+"""Of a comment as much as there is room for on the sheet."""
 
 
 def label(
@@ -20,6 +24,9 @@ def label(
         float | None, typer.Option(min=0, help="Look each so many seconds. Absent: at ten times as many as chosen.")
     ] = None,
     gap: Annotated[float, typer.Option(min=0, help="Least time between two chosen frames; s.")] = 0.5,
+    review: Annotated[
+        Path | None, typer.Option(help="Folder of a run of this film: begin with what `standoff open` called false.")
+    ] = None,
     threshold: Annotated[float, typer.Option(help="Score from which a box is proposed, between 0 and 1.")] = 0.3,
     fps: Annotated[float | None, typer.Option(help="Frames a second of a picture folder.")] = None,
     layout: Annotated[
@@ -38,13 +45,30 @@ def label(
     from standoff.training.frame_selection.doubt import LEAST_SCORE
 
     selection = SelectionParams(frames=frames, threshold=_part(threshold), least_gap_s=gap)
-    plan = LabelPlan(source, selection, every_s=every, fps=fps, format=layout)
+    plan = LabelPlan(source, selection, every_s=every, fps=fps, format=layout, wanted=_false_alarms(review))
     with whole_folder(out, overwrite=overwrite, own=LABEL_FILES) as folder:
         params = DetectParams(score_threshold=min(threshold, LEAST_SCORE), ground_points="none")
         detector = OnnxDetector(find_model(model), params)
         report = label_frames(plan, detector, folder, partial(progress, quiet=quiet))
     if not quiet:
         _tell(report, out)
+
+
+def _false_alarms(run: Path | None) -> dict[float, str]:
+    """Return when in its film a run's hazards were at their worst that somebody called false, and what was said."""
+    from standoff.clips.reviews import read_reviews
+    from standoff.core.errors import DataError
+
+    if run is None:
+        return {}
+    said = [one for one in read_reviews(run).values() if one.verdict == "false_alarm"]
+    if not said:
+        raise DataError(
+            expected=f"hazards in {run} that somebody called false alarms",
+            found="none",
+            fix=f"say so in `standoff open {run}`, or leave --review out",
+        )
+    return {one.time_s: shorten(f"false alarm: {one.comment}", _LONGEST_REASON).removesuffix(":") for one in said}
 
 
 def _part(threshold: float) -> float:

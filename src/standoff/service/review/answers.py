@@ -108,6 +108,7 @@ class FrameAt(Told):
     has_map: bool
     reason: str = Field(description="Why there is no map; empty: there is one.")
     watched_share: float | None
+    is_moved: bool = Field(description="Places are counted from elsewhere than in the frame before.")
     tracks: list[TrackAt]
     pairs: list[PairAt]
 

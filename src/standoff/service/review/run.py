@@ -34,10 +34,11 @@ _TURNS: Final = np.linspace(0.0, 2.0 * np.pi, 25)
 _CIRCLE: Final = np.column_stack([np.cos(_TURNS), np.sin(_TURNS)])
 _OUTLIERS: Final = (1.0, 99.0)
 """Per cent of places that the plan need not show."""
-_PLAN_MARGIN_M: Final = 3.0
+_PLAN_MARGIN_M: Final = 1.0
 
 _TRACKS: Final = (
     "frame", "track_id", "class", "x1_px", "y1_px", "x2_px", "y2_px", "observed", "x_m", "y_m", "radius_m", "valid",
+    "vx_mps",
 )  # fmt: skip
 _PAIRS: Final = ("frame", "track_a", "track_b", "distance_m", "gap_m", "sigma_m", "filtered")
 _FRAMES: Final = ("frame", "time_s", "watched_share", *(name for name, *_ in MAP_COLUMNS))
@@ -92,15 +93,15 @@ class FinishedRun:
 
     def bounds_m(self) -> tuple[float, float, float, float] | None:
         """Return the least x and y and the largest of where anybody was; None where nobody was placed."""
-        places = self._whole("tracks", ("x_m", "y_m"))
-        known = np.isfinite(places["x_m"]) & np.isfinite(places["y_m"])
+        tracks = self._whole("tracks", ("x_m", "y_m", "radius_m"))
+        known = np.isfinite(tracks["x_m"]) & np.isfinite(tracks["y_m"])
         if not known.any():
             return None
-        (left, right), (low, high) = (np.percentile(places[name][known], _OUTLIERS) for name in ("x_m", "y_m"))
-        return (
-            float(left) - _PLAN_MARGIN_M, float(low) - _PLAN_MARGIN_M,
-            float(right) + _PLAN_MARGIN_M, float(high) + _PLAN_MARGIN_M,
-        )  # fmt: skip
+        places_m = np.column_stack([tracks["x_m"], tracks["y_m"]])[known]
+        radius_m = tracks["radius_m"][known, None]
+        left, low = np.percentile(places_m - radius_m, _OUTLIERS[0], axis=0).tolist()
+        right, high = np.percentile(places_m + radius_m, _OUTLIERS[1], axis=0).tolist()
+        return left - _PLAN_MARGIN_M, low - _PLAN_MARGIN_M, right + _PLAN_MARGIN_M, high + _PLAN_MARGIN_M
 
     def curves(self) -> CurvesAnswer:
         """Return the least gap and the least watched share over the run, in a bounded number of spans.
@@ -132,11 +133,17 @@ class FinishedRun:
         tracks = _by_frame(self._rows("tracks", _TRACKS, span_s))
         pairs = _by_frame(self._rows("proximity", _PAIRS, span_s))
         lives = [life for life in self.lives if life.opened_s <= to_s and not (life.closed_s or math.inf) < from_s]
-        return [self._frame(frame, tracks.get(frame["frame"], ()), pairs.get(frame["frame"], ()), lives) for frame in frames]
+        found: list[FrameAt] = []
+        before: Sequence[dict[str, Any]] = ()
+        for frame in frames:
+            now = tracks.get(frame["frame"], ())
+            found.append(self._frame(frame, now, pairs.get(frame["frame"], ()), lives, is_moved=_is_moved(before, now)))
+            before = now
+        return found
 
     def _frame(
         self, frame: dict[str, Any], tracks: Sequence[dict[str, Any]], pairs: Sequence[dict[str, Any]],
-        lives: Sequence[HazardLife],
+        lives: Sequence[HazardLife], *, is_moved: bool,
     ) -> FrameAt:  # fmt: skip
         time_s = float(frame["time_s"])
         ground = self._map(frame)
@@ -156,6 +163,7 @@ class FinishedRun:
             has_map=isinstance(ground, GroundMap),
             reason=ground.reason if isinstance(ground, NoGroundMap) else "",
             watched_share=None if math.isnan(share) else share,
+            is_moved=is_moved,
             tracks=[_track(row, ground, worst.get(row["track_id"])) for row in tracks],
             pairs=[self._pair(row, places, ground, worst_of_pair) for row in _worth_showing(pairs, worst_of_pair)],
         )
@@ -202,6 +210,13 @@ def _by_frame(rows: Sequence[dict[str, Any]]) -> dict[int, list[dict[str, Any]]]
     for row in rows:
         found.setdefault(row["frame"], []).append(row)
     return found
+
+
+def _is_moved(before: Sequence[dict[str, Any]], now: Sequence[dict[str, Any]]) -> bool:
+    """Return whether places are counted from elsewhere now: then nobody's velocity is known any more."""
+    known = {row["track_id"] for row in before if not math.isnan(row["vx_mps"])}
+    still = [row for row in now if row["track_id"] in known and row["valid"]]
+    return bool(still) and all(math.isnan(row["vx_mps"]) for row in still)
 
 
 def _graver(before: Severity | None, now: Severity) -> Severity:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -46,6 +46,7 @@ class LabelPlan:
         every_s: Time between frames that are looked at; None: ten times as many as are wanted.
         fps: Pictures a second of a folder.
         format: Of the proposed boxes.
+        wanted: Times of frames that are chosen before all others, and why.
     """
 
     source: Path
@@ -53,6 +54,7 @@ class LabelPlan:
     every_s: Annotated[float, Ge(0), Doc("Seconds.")] | None = None
     fps: Annotated[float, Gt(0), Doc("Needed for a folder.")] | None = None
     format: Format = "both"
+    wanted: Mapping[float, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -88,7 +90,7 @@ def label_frames(plan: LabelPlan, detector: Detector, folder: Path, progress: Pr
     threshold = plan.selection.threshold
     with open_source(plan.source, fps=plan.fps) as source, progress("looking", source.frame_count) as step:
         every_s = _every_s(plan, source)
-        candidates = list(look_through(_counted(source, step), detector, every_s, threshold))
+        candidates = list(look_through(_counted(source, step), detector, every_s, threshold, plan.wanted))
     choices = choose(candidates, plan.selection)
     proposals, tiles = [], []
     (folder / _PICTURES).mkdir()

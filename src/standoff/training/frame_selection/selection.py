@@ -43,6 +43,7 @@ class CandidateFrame:
         flicker: How many boxes that count have no counterpart in the next frame.
         sharpness: See `appearance.sharpness`.
         look: (D,) see `appearance.describe`.
+        wanted: Why somebody asks for this very frame; empty: nobody does.
     """
 
     index: int
@@ -52,6 +53,7 @@ class CandidateFrame:
     flicker: int
     sharpness: float
     look: FloatArray
+    wanted: str = ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,7 +74,8 @@ def choose(candidates: Sequence[CandidateFrame], params: SelectionParams) -> lis
 
     Greedy k-centre with weights: the most doubtful frame first, then again and again the one with the largest
     product of its distance from all that are chosen and a weight that grows with its rank in doubt. Blurred frames
-    are left out, and none is nearer in time to another than `least_gap_s`. The result depends on nothing random.
+    are left out, and none is nearer in time to another than `least_gap_s`. The result depends on nothing random. What
+    somebody asks for comes before all that, however it looks.
 
     Args:
         candidates: In the order of time.
@@ -93,7 +96,11 @@ def choose(candidates: Sequence[CandidateFrame], params: SelectionParams) -> lis
     weight = _LEAST_WEIGHT + (1.0 - _LEAST_WEIGHT) * _ranks(unsure)
     distance = np.full(len(candidates), np.inf)
     free = sharp.copy()
-    chosen: list[int] = []
+    chosen: list[int] = [i for i, one in enumerate(candidates) if one.wanted][: params.frames]
+    for i in chosen:
+        distance = np.minimum(distance, np.linalg.norm(looks - looks[i], axis=1))
+        free &= np.abs(time_s - time_s[i]) >= params.least_gap_s
+        free[i] = False
     while free.any() and len(chosen) < params.frames:
         gain = np.where(free, weight * (distance if chosen else 1.0), -1.0)
         best = int(gain.argmax())
@@ -128,6 +135,8 @@ def _ranks(values: FloatArray) -> FloatArray:
 
 
 def _reason(candidate: CandidateFrame, threshold: float, doubtful_from: float) -> str:
+    if candidate.wanted:
+        return candidate.wanted
     flicker = f"{candidate.flicker} that flicker{'s' * (candidate.flicker == 1)}"
     score = candidate.detections.score
     near = int(((score >= 0.5 * threshold) & (score < 0.5 * (1 + threshold))).sum())
