@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from service.demo_film import DEMO
 
 from standoff.core.homography import FloatArray
 from standoff.core.pose import View
 from standoff.stages.ground import load_camera
 
 pytest.importorskip("fastapi", reason="the page's server needs the extra `serve`")
-DEMO = Path(str(files("standoff"))) / "demo"
-SIDE_M, HEIGHT_M = 2.89, 0.42
-"""Of the demo's footing."""
-
 
 @pytest.fixture(scope="session")
 def truth() -> dict[str, Any]:

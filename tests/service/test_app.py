@@ -13,7 +13,7 @@ import pytest
 pytest.importorskip("fastapi", reason="the page's server needs the extra `serve`")
 
 from fastapi.testclient import TestClient
-from service.conftest import DEMO, HEIGHT_M, SIDE_M
+from service.demo_film import DEMO, HEIGHT_M, SIDE_M
 
 from standoff.core.homography import FloatArray
 from standoff.service.loopback import OpenPages

@@ -13,7 +13,7 @@ from laws import seeds
 
 pytest.importorskip("fastapi", reason="the page's server needs the extra `serve`")
 
-from service.conftest import DEMO, HEIGHT_M, SIDE_M
+from service.demo_film import CLICK_PX, DEMO, HEIGHT_M, SIDE_M
 
 from standoff.config import load_settings
 from standoff.core.homography import FloatArray
@@ -24,8 +24,6 @@ from standoff.service.setup.draft import Draft, PointDraft, ReferenceDraft, Zone
 from standoff.service.setup.film import Film, snapped_px
 from standoff.service.setup.sight import Sight
 from standoff.service.setup.site_file import save_site
-
-CLICK_PX = 2.0
 
 
 @pytest.fixture(scope="module")

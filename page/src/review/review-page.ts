@@ -16,6 +16,7 @@ export class ReviewPage extends ReviewPart {
 
   override connectedCallback(): void {
     super.connectedCallback();
+    document.documentElement.lang = this.language;
     void this.view.open();
   }
 

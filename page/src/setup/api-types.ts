@@ -458,6 +458,12 @@ export interface components {
              */
             method: string;
             /**
+             * Is Rough
+             * @description Straight from the clicks: edges are looked for afterwards.
+             * @default false
+             */
+            is_rough: boolean;
+            /**
              * Solid Px
              * @description The reference as it is taken to be: lines.
              */
@@ -512,6 +518,12 @@ export interface components {
             /** Time S */
             time_s: number;
             draft: components["schemas"]["Draft-Input"];
+            /**
+             * Is Dragging
+             * @description At once, straight from the clicks: a hand moves a corner.
+             * @default false
+             */
+            is_dragging: boolean;
         };
         /** HTTPValidationError */
         HTTPValidationError: {
@@ -569,6 +581,12 @@ export interface components {
             /** Time S */
             time_s: number;
             draft: components["schemas"]["Draft-Input"];
+            /**
+             * Is Dragging
+             * @description At once, straight from the clicks: a hand moves a corner.
+             * @default false
+             */
+            is_dragging: boolean;
             /** At Px */
             at_px: [
                 number,
@@ -842,6 +860,12 @@ export interface components {
             /** Time S */
             time_s: number;
             draft: components["schemas"]["Draft-Input"];
+            /**
+             * Is Dragging
+             * @description At once, straight from the clicks: a hand moves a corner.
+             * @default false
+             */
+            is_dragging: boolean;
             /** From Px */
             from_px: [
                 number,

@@ -176,14 +176,20 @@ export class PictureView extends SetupPart {
     const away: Pixel = [event.clientX - held.screen[0], event.clientY - held.screen[1]];
     held.moved ||= Math.hypot(...away) > CLICK_MOVES_PX;
     if (!held.moved) return;
-    if (held.grip) this.put(held.grip, this.under);
-    else this.middle = [held.middle[0] - away[0] * this.screenPx, held.middle[1] - away[1] * this.screenPx];
+    if (held.grip) {
+      this.site.isDragging = true;
+      this.put(held.grip, this.under);
+    } else this.middle = [held.middle[0] - away[0] * this.screenPx, held.middle[1] - away[1] * this.screenPx];
   }
 
   private release(event: PointerEvent): void {
     const held = this.held;
     this.held = undefined;
     if (!held) return;
+    if (this.site.isDragging) {
+      this.site.isDragging = false;
+      void this.site.look();
+    }
     const at = this.at(event);
     if (held.grip) {
       if (held.moved) void this.snap(held.grip, at);

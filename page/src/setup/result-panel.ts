@@ -24,7 +24,7 @@ export class ResultPanel extends SetupPart {
     if (!ground.found) return html`<p class="wrong">${this.say("notFound")} ${ground.reason}</p>${this.doubts()}`;
     const share = ground.watched ? `${Math.round(100 * ground.watched.share)} %` : "";
     return html`
-      <p class="good">✓ ${this.say("found")}</p>
+      <p class="good">✓ ${this.say("found")}${ground.is_rough ? html` <span class="quiet">${this.say("rough")}</span>` : nothing}</p>
       ${ground.camera_height_text ? html`<p>${this.say("cameraUp", { height: ground.camera_height_text })}</p>` : nothing}
       ${ground.off_px != null ? html`<p class="quiet">${this.say("clicksOff", { px: ground.off_px.toFixed(1) })}</p>` : nothing}
       ${share ? html`<p>${this.say("watchedShare", { share })}</p>` : nothing}

@@ -35,6 +35,7 @@ export class SetupPage extends SetupPart {
 
   override connectedCallback(): void {
     super.connectedCallback();
+    document.documentElement.lang = this.language;
     void this.site.open();
   }
 

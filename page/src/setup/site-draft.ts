@@ -20,6 +20,7 @@ export class SiteDraft extends Knowledge {
   plan = "";
   ground?: GroundAnswer;
   isLooking = false;
+  isDragging = false;
   tool: Tool = "corners";
   tapeEnds: Pixel[] = [];
   tape?: TapeAnswer;
@@ -102,15 +103,15 @@ export class SiteDraft extends Knowledge {
     this.tellAll();
     do {
       this.asksAgain = false;
-      const { draft, timeS } = this;
+      const { draft, timeS, isDragging } = this;
       if (!draft) break;
       await this.trying(async () => {
-        const ground = await ask.ground(timeS, draft);
+        const ground = await ask.ground(timeS, draft, isDragging);
         if (timeS === this.timeS) this.ground = ground;
         if (this.tapeEnds.length === 2) this.tape = await ask.tape(timeS, draft, this.tapeEnds[0]!, this.tapeEnds[1]!);
         this.isLooking = this.asksAgain;
         this.tellAll();
-        if (!this.asksAgain) await this.showPlan(ground.plan ? await ask.plan(timeS, draft) : undefined);
+        if (!this.asksAgain && !isDragging) await this.showPlan(ground.plan ? await ask.plan(timeS, draft) : undefined);
       });
     } while (this.asksAgain);
     this.isAsking = this.isLooking = false;

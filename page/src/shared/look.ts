@@ -50,6 +50,8 @@ export const controls = css`
   }
   button {
     cursor: pointer;
+    max-width: 100%;
+    overflow-wrap: anywhere;
   }
   button[aria-pressed="true"],
   button.main {

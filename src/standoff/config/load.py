@@ -86,11 +86,12 @@ def _check_environment() -> None:
     """Raise ConfigError for a variable that looks like a setting and is none: it would be passed over."""
     prefix = str(Settings.model_config.get("env_prefix", ""))
     sections = [f"{prefix}{name.upper()}" for name in Settings.model_fields]
+    known = {_letters(name): name for name in _variables(resolved(Settings.model_construct()), prefix)}
     for variable in os.environ:
         named = variable.upper()
         if named.partition("__")[0] in sections:
             continue
-        nearest = _nearest_variable(named, prefix)
+        nearest = _nearest(named, known)
         if named.startswith(prefix) or (nearest and _begins_like(named, prefix)):
             meant = f", or write {nearest} if that is what is meant" if nearest else ""
             file = "; a settings file is named with --config" if _letters(named) == _letters(f"{prefix}config") else ""
@@ -101,9 +102,13 @@ def _check_environment() -> None:
             )
 
 
-def _nearest_variable(named: str, prefix: str) -> str:
-    """Return the variable of a setting whose letters are nearly those of another one; "" if there is none."""
-    known = {_letters(name): name for name in _variables(resolved(Settings.model_construct()), prefix)}
+def _nearest(named: str, known: Mapping[str, str]) -> str:
+    """Return the variable of a setting whose letters are nearly those of another one; "" if there is none.
+
+    Args:
+        named: The other one.
+        known: Variables of settings by their letters.
+    """
     near = get_close_matches(_letters(named), known, n=1, cutoff=_ALIKE)
     return known[near[0]] if near else ""
 

@@ -147,10 +147,12 @@ class FinishedRun:
     ) -> FrameAt:  # fmt: skip
         time_s = float(frame["time_s"])
         ground = self._map(frame)
+        # The end of the run closes what is open at its last frame, which was no less grave for that.
+        asked_s = time_s if time_s < self.last_s else math.nextafter(time_s, -math.inf)
         worst: dict[int, Severity] = {}
         worst_of_pair: dict[tuple[int, ...], Severity] = {}
         for life in lives:
-            severity = life.severity_at(time_s)
+            severity = life.severity_at(asked_s)
             if severity is None:
                 continue
             worst_of_pair[life.track_ids] = _graver(worst_of_pair.get(life.track_ids), severity)

@@ -8,10 +8,12 @@ from pydantic import BaseModel, Field
 
 from standoff.core.lengths import UnitName
 from standoff.service.answering import Told
-from standoff.service.setup.draft import Draft, Pixel
+from standoff.service.setup.draft import Draft, Pixel, Seconds
 
-Place = tuple[float, float]
+Place: TypeAlias = tuple[float, float]
 """Metres in the site frame."""
+Point: TypeAlias = tuple[float, float]
+"""Pixels; what lies near the horizon may be far outside the picture."""
 
 
 class FilmAnswer(Told):
@@ -51,14 +53,14 @@ class RevisionAnswer(Told):
 class PointQuestion(BaseModel):
     """Which corner is near a point of a picture?"""
 
-    time_s: float
+    time_s: Seconds
     at_px: Pixel
 
 
 class PointAnswer(Told):
     """A corner, or the point itself."""
 
-    at_px: Pixel
+    at_px: Point
     snapped: bool
 
 
@@ -67,7 +69,7 @@ class LengthQuestion(BaseModel):
 
     unit: UnitName
     text: str = Field(default="", max_length=60, description="As typed; a bare number is in `unit`.")
-    length_m: float | None = Field(default=None, allow_inf_nan=False, description="In place of `text`.")
+    length_m: float | None = Field(default=None, ge=0, le=1e6, description="In place of `text`.")
 
 
 class LengthAnswer(Told):
@@ -82,7 +84,7 @@ class Contour(Told):
 
     sigma_m: float
     text: str
-    lines_px: list[list[Pixel]]
+    lines_px: list[list[Point]]
 
 
 class Entity(Told):
@@ -92,7 +94,7 @@ class Entity(Told):
     score: float
     box_px: tuple[float, float, float, float]
     at_m: Place | None = Field(description="Where it stands; null: not known.")
-    circle_px: list[Pixel] = Field(description="Its action radius on the ground, as it is in the picture.")
+    circle_px: list[Point] = Field(description="Its action radius on the ground, as it is in the picture.")
 
 
 class Plan(Told):
@@ -122,23 +124,25 @@ class GroundAnswer(Told):
     missing: str = Field(description="What is still to be clicked or typed; empty: nothing.")
     reason: str = Field(description="Why there is no map; empty: there is one.")
     method: str = ""
-    solid_px: list[list[Pixel]] = Field(default_factory=list, description="The reference as it is taken to be: lines.")
-    corners_px: list[Pixel] = Field(default_factory=list, description="Its top's corners, as found.")
+    is_rough: bool = Field(default=False, description="Straight from the clicks: edges are looked for afterwards.")
+    solid_px: list[list[Point]] = Field(default_factory=list, description="The reference as it is taken to be: lines.")
+    corners_px: list[Point] = Field(default_factory=list, description="Its top's corners, as found.")
     off_px: float | None = Field(default=None, description="How far the clicked corners are from them, at most.")
     camera_height_text: str = Field(default="", description="Above the ground; empty: not known.")
     contours: list[Contour] = Field(default_factory=list)
     watched: Watched | None = None
     plan: Plan | None = None
     entities: list[Entity] = Field(default_factory=list)
-    zones_px: list[list[Pixel]] = Field(default_factory=list, description="As drawn on the ground, one ring a zone.")
+    zones_px: list[list[Point]] = Field(default_factory=list, description="As drawn on the ground, one ring a zone.")
     warnings: list[str] = Field(default_factory=list, description="What contradicts what.")
 
 
 class GroundQuestion(BaseModel):
     """What does a draft say of the ground in the picture at a time?"""
 
-    time_s: float
+    time_s: Seconds
     draft: Draft
+    is_dragging: bool = Field(default=False, description="At once, straight from the clicks: a hand moves a corner.")
 
 
 class TapeQuestion(GroundQuestion):
@@ -161,7 +165,7 @@ class TapeAnswer(Told):
 class PlacesQuestion(GroundQuestion):
     """Where on the ground are points of the picture?"""
 
-    at_px: list[Pixel]
+    at_px: list[Pixel] = Field(max_length=1000)
 
 
 class PlacesAnswer(Told):
@@ -173,7 +177,7 @@ class PlacesAnswer(Told):
 class TrialQuestion(BaseModel):
     """Run some seconds with a draft."""
 
-    time_s: float
+    time_s: Seconds
     lasts_s: float = Field(default=10.0, gt=0, le=60)
     draft: Draft
 

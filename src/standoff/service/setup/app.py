@@ -107,7 +107,7 @@ class SetupPage:
 
     def ground(self, question: GroundQuestion) -> GroundAnswer:
         """What does a draft say of the ground in the picture at a time?"""
-        return self._sight.answer(question.time_s, question.draft)
+        return self._sight.answer(question.time_s, question.draft, is_dragging=question.is_dragging)
 
     def plan(self, question: GroundQuestion) -> Response:
         """Show the ground from above, as the answer to `ground` describes it."""

@@ -18,7 +18,13 @@ from standoff.core.lengths import UNITS, TypedLength, UnitName
 from standoff.core.zones import Zone, ZoneKind
 from standoff.files.json_text import read_json, write_json
 
-Pixel: TypeAlias = tuple[float, float]
+_Coordinate: TypeAlias = Annotated[float, Field(ge=-1e6, le=1e6)]
+Pixel: TypeAlias = tuple[_Coordinate, _Coordinate]
+"""As somebody clicked it; inside the picture or about there."""
+Place: TypeAlias = tuple[Annotated[float, Field(ge=-1e7, le=1e7)], Annotated[float, Field(ge=-1e7, le=1e7)]]
+"""Metres in the site frame, as somebody typed or drew it: grids of whole countries are within."""
+Seconds: TypeAlias = Annotated[float, Field(ge=0, le=1e6)]
+"""Time in the film."""
 Shape: TypeAlias = Literal["square", "rectangle", "sides"]
 Metres: TypeAlias = Annotated[float, Field(gt=0, le=1000)]
 SHAPE_LENGTHS: Final = {"square": 1, "rectangle": 2, "sides": 5}
@@ -42,7 +48,7 @@ class ReferenceDraft(_Part):
     lengths_m: list[Metres | None] = Field(default_factory=list, description="As `shape` wants them; null: not typed.")
     height_m: float | None = Field(default=None, ge=0, le=100, description="Of its top; null: estimated.")
     corners_px: list[Pixel] = Field(default_factory=list, max_length=_CORNERS)
-    time_s: float = Field(default=0.0, ge=0, description="Of the picture in which they were clicked.")
+    time_s: Seconds = Field(default=0.0, description="Of the picture in which they were clicked.")
 
 
 class PointDraft(_Part):
@@ -50,16 +56,16 @@ class PointDraft(_Part):
 
     name: str = Field(min_length=1, max_length=60)
     at_px: Pixel | None = Field(default=None, description="null: not clicked yet.")
-    m: tuple[float, float] | None = None
-    lonlat: tuple[float, float] | None = Field(default=None, description="Degrees (WGS 84), in place of `m`.")
-    z_m: float | None = None
+    m: Place | None = None
+    lonlat: tuple[Annotated[float, Field(ge=-180, le=180)], Annotated[float, Field(ge=-90, le=90)]] | None = Field(default=None, description="Degrees (WGS 84), in place of `m`.")
+    z_m: float | None = Field(default=None, ge=-1e4, le=1e4)
 
 
 class SurveyDraft(_Part):
     """Surveyed points, seen in one picture."""
 
     points: list[PointDraft] = Field(default_factory=list, max_length=200)
-    time_s: float = Field(default=0.0, ge=0)
+    time_s: Seconds = 0.0
 
     @property
     def seen(self) -> list[PointDraft]:
@@ -72,7 +78,7 @@ class ZoneDraft(_Part):
 
     name: str = Field(min_length=1, max_length=60)
     kind: ZoneKind
-    ring_m: list[tuple[float, float]] = Field(max_length=200)
+    ring_m: list[Place] = Field(max_length=200)
 
 
 class Draft(_Part):

@@ -16,7 +16,7 @@ import numpy as np
 
 from standoff.config import Settings, build_ground, build_stage, build_watcher, settings_from
 from standoff.core.classes import CLASSES, Role, class_ids
-from standoff.core.errors import GroundError, StandoffError
+from standoff.core.errors import ConfigError, GroundError, StandoffError
 from standoff.core.homography import FloatArray
 from standoff.core.lengths import UNITS, LengthUnit
 from standoff.core.map_error import map_jacobian, picture_jacobian
@@ -42,10 +42,12 @@ from standoff.service.setup.answers import (
     Entity,
     GroundAnswer,
     Plan,
+    Point,
     TapeAnswer,
     Watched,
 )
-from standoff.service.setup.draft import Draft, Pixel
+from standoff.service.setup.clicked_map import clicked_map
+from standoff.service.setup.draft import Draft, Pixel, corners_in_order
 from standoff.service.setup.film import Film
 
 _ALONE: Final = NoCameraMotion("one picture alone")
@@ -60,6 +62,9 @@ _CLICK_SIGMA_PX: Final = 1.0
 _TURNS: Final = np.linspace(0.0, 2.0 * np.pi, 49)
 _CIRCLE: Final = np.column_stack([np.cos(_TURNS), np.sin(_TURNS)])
 _EDGE_STEPS: Final = 16
+_SAME_S: Final = 1e-3
+"""Times this near to each other are of one picture."""
+_ANYWHERE_PX: Final = [(0.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, 0.0)]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -96,6 +101,7 @@ class Sight:
         self._detects = detects
         self._folder = TemporaryDirectory(prefix="standoff-setup-")
         self._lock = threading.Lock()
+        self._checked: tuple[str, Settings] | None = None
         self._seen: OrderedDict[tuple[float, str], Seen] = OrderedDict()
 
     def close(self) -> None:
@@ -106,8 +112,11 @@ class Sight:
         """Return what a draft says, laid over the settings of the site's file.
 
         Raises:
-            StandoffError: It contradicts itself.
+            StandoffError: It contradicts itself, or is not complete.
         """
+        missing = draft.missing()
+        if missing:
+            raise ConfigError(expected="a draft that tells the metres", found=f"still to do: {missing}", fix="complete it")
         survey, zones = (Path(self._folder.name) / name for name in ("survey.yaml", "zones.geojson"))
         own = draft.settings(survey, zones)
         if draft.ground == "survey":
@@ -138,6 +147,23 @@ class Sight:
                 self._seen.popitem(last=False)
             return seen
 
+    def _at_once(self, time_s: float, draft: Draft) -> Seen | None:
+        """Look with the clicked corners as they are; None: there are none in this picture."""
+        frame, reference = self.film.frame(time_s), draft.reference
+        if draft.ground != "reference" or abs(reference.time_s - frame.time_s) > _SAME_S:
+            return None
+        corners_px, _ = corners_in_order(reference.corners_px)
+        # The corners are all that changes while one of them is dragged: the rest is checked once.
+        elsewhere = draft.model_copy(update={"reference": reference.model_copy(update={"corners_px": _ANYWHERE_PX})})
+        key = json.dumps(elsewhere.model_dump(mode="json"), sort_keys=True)
+        if self._checked is None or self._checked[0] != key:
+            self._checked = key, self.settings(draft)
+        settings = self._checked[1]
+        assert settings.ground.reference is not None
+        shape, height_m = settings.ground.reference.shape(), reference.height_m or 0.0
+        ground = clicked_map(corners_px, shape.corners_m, height_m, self.film.camera_prior)
+        return Seen(frame, settings, ground, self.film.found(frame) if self._detects else Detections.empty(), {})
+
     def _map(self, stage: Ground, frame: Frame, detections: Detections, draft: Draft) -> GroundMap | NoGroundMap:
         """Map the picture that was clicked in, then carry on to another one if that is asked for."""
         told_s = {"reference": draft.reference.time_s, "survey": draft.survey.time_s}.get(draft.ground, frame.time_s)
@@ -148,8 +174,13 @@ class Sight:
         # Not clicked in this one: only what is found again counts.
         return stage.update(frame, detections, _ALONE)
 
-    def answer(self, time_s: float, draft: Draft) -> GroundAnswer:
+    def answer(self, time_s: float, draft: Draft, *, is_dragging: bool = False) -> GroundAnswer:
         """Say everything about one picture.
+
+        Args:
+            time_s: When it is.
+            draft: What was clicked and typed.
+            is_dragging: Answer at once, straight from the clicks, where that can be.
 
         Raises:
             StandoffError: The film cannot be read.
@@ -158,7 +189,8 @@ class Sight:
         if missing:
             return GroundAnswer(time_s=time_s, found=False, missing=missing, reason="")
         try:
-            seen = self.see(time_s, draft)
+            rough = self._at_once(time_s, draft) if is_dragging else None
+            seen = rough or self.see(time_s, draft)
         except StandoffError as error:
             return GroundAnswer(time_s=time_s, found=False, missing="", reason=str(error))
         warnings = [str(one) for one in seen.about.get("warnings", ())]
@@ -180,6 +212,7 @@ class Sight:
             missing="",
             reason="",
             method=ground.method,
+            is_rough=rough is not None,
             solid_px=_solid_px(seen, ground, top_px),
             corners_px=_pixels(top_px),
             off_px=_off_px(draft, top_px, seen.frame.time_s),
@@ -295,7 +328,7 @@ def _camera_height(ground: GroundMap, unit: LengthUnit) -> str:
         return ""
 
 
-def _solid_px(seen: Seen, ground: GroundMap, top_px: FloatArray) -> list[list[Pixel]]:
+def _solid_px(seen: Seen, ground: GroundMap, top_px: FloatArray) -> list[list[Point]]:
     """Return the outline of the reference's top as seen, of its foot as the map has it, and the edges between."""
     reference = seen.settings.ground.reference
     if reference is None or len(top_px) < 3:
@@ -310,7 +343,7 @@ def _solid_px(seen: Seen, ground: GroundMap, top_px: FloatArray) -> list[list[Pi
 
 def _off_px(draft: Draft, top_px: FloatArray, time_s: float) -> float | None:
     clicked = np.array(draft.reference.corners_px)
-    if draft.ground != "reference" or len(top_px) != len(clicked) or abs(draft.reference.time_s - time_s) > 1e-3:
+    if draft.ground != "reference" or len(top_px) != len(clicked) or abs(draft.reference.time_s - time_s) > _SAME_S:
         return None
     away = np.linalg.norm(clicked[:, None] - top_px[None], axis=2)
     return float(away.min(axis=1).max())
@@ -349,7 +382,7 @@ def _entities(tracks: Tracks, positions: GroundPositions, ground: AnyGround) -> 
     entities = []
     for row in range(len(tracks)):
         is_placed = bool(positions.valid[row])
-        circle: list[Pixel] = []
+        circle: list[Point] = []
         if is_placed and isinstance(ground, GroundMap):
             circle = _ring_px(ground, positions.xy_m[row] + positions.radius_m[row] * _CIRCLE[:-1], steps=1)
         left, top, right, bottom = tracks.xyxy_px[row].tolist()
@@ -365,7 +398,7 @@ def _entities(tracks: Tracks, positions: GroundPositions, ground: AnyGround) -> 
     return entities
 
 
-def _ring_px(ground: GroundMap, ring_m: FloatArray, steps: int = _EDGE_STEPS) -> list[Pixel]:
+def _ring_px(ground: GroundMap, ring_m: FloatArray, steps: int = _EDGE_STEPS) -> list[Point]:
     """Return a closed ring on the ground as it is in the picture; its sides bend where the lens does."""
     after = np.roll(ring_m, -1, axis=0)
     shares = np.arange(steps) / steps
@@ -374,7 +407,7 @@ def _ring_px(ground: GroundMap, ring_m: FloatArray, steps: int = _EDGE_STEPS) ->
     return _pixels(points_px[seen])
 
 
-def _pixels(points_px: FloatArray) -> list[Pixel]:
+def _pixels(points_px: FloatArray) -> list[Point]:
     return [(round(x, 2), round(y, 2)) for x, y in points_px.tolist()]
 
 
