@@ -21,9 +21,16 @@ BUILT = PROJECT / "src" / "standoff" / "service" / "page" / "assets"
 SLOW_MS = 120_000
 
 
+def told(figure: str) -> None:
+    """Say a figure; `pytest -s` shows it."""
+    sys.stdout.write(f"{figure}\n")
+
+
 def needs_browser() -> None:
     """Skip where there is no browser or no page; CI has both."""
-    missing = [name for name, there in (("chromium", CHROMIUM), ("the built pages: make page", BUILT.is_dir())) if not there]
+    missing = [
+        name for name, there in (("chromium", CHROMIUM), ("the built pages: make page", BUILT.is_dir())) if not there
+    ]
     if missing and os.environ.get("REQUIRE_BROWSER"):
         pytest.fail(f"this machine is to have {missing[0]}")
     if missing:
@@ -58,8 +65,12 @@ class Browser:
         self.page = context.new_page()
         self.page.set_default_timeout(SLOW_MS)
         self.complaints: list[str] = []
-        self.page.on("console", lambda said: said.type in ("error", "warning") and self.complaints.append(said.text))
+        self.page.on("console", self._heard)
         self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
+
+    def _heard(self, said: Any) -> None:
+        if said.type in ("error", "warning"):
+            self.complaints.append(said.text)
 
     def picture_click(self, selector: str, at_px: tuple[float, float], width_px: int) -> None:
         """Click a point of the film's picture."""

@@ -17,9 +17,10 @@ from standoff.stages.ground import load_camera
 
 pytest.importorskip("fastapi", reason="the page's server needs the extra `serve`")
 
+
 @pytest.fixture(scope="session")
 def truth() -> dict[str, Any]:
-    return pq.read_table(DEMO / "frames.parquet").to_pydict()
+    return dict(pq.read_table(DEMO / "frames.parquet").to_pydict())
 
 
 @pytest.fixture(scope="session")

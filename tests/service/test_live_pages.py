@@ -18,7 +18,7 @@ from cli.conftest import write_site
 from cli.test_cli import make_video
 from cli.test_replay import TABLES, monitor
 from laws import seeds
-from service.browser import Browser, browsing, needs_browser, served
+from service.browser import BUILT, Browser, browsing, needs_browser, served, told
 from service.demo_film import CLICK_PX, DEMO, HEIGHT_M, SIDE_M
 
 from standoff.config import load_settings
@@ -27,13 +27,15 @@ from standoff.core.pose import View
 from standoff.monitor import open_run
 
 pytestmark = pytest.mark.live
+FILM_VIEW = "document.querySelector('review-page')?.shadowRoot.querySelector('film-view')"
 PICTURE = "picture-view svg.picture"
 WIDTH_PX, HEIGHT_PX = 1920, 1080
 TOO_WIDE = """() => {
   const found = [];
   const look = (root) => root.querySelectorAll("*").forEach((one) => {
     const { right, width } = one.getBoundingClientRect();
-    if (width && right > document.documentElement.clientWidth + 1 && !one.closest("svg *, ol")) found.push(one.localName);
+    const sticksOut = width && right > document.documentElement.clientWidth + 1;
+    if (sticksOut && !one.closest("svg *, ol")) found.push(one.localName);
     if (one.shadowRoot) look(one.shadowRoot);
   });
   if (document.documentElement.scrollWidth > document.documentElement.clientWidth) look(document);
@@ -96,10 +98,10 @@ def test_four_clicks_give_metres_and_what_is_saved_runs(
         began_s = time.monotonic()
         browser.page.goto(address)
         browser.page.wait_for_selector(f"{PICTURE} image")
-        print(f"usable after {time.monotonic() - began_s:.2f} s")
+        told(f"usable after {time.monotonic() - began_s:.2f} s")
         click_reference(browser, corners_px, rng)
         length_m = tape(browser, ends_px)
-        print(f"10 m are {length_m:.2f} m after 4 clicks on the reference and 2 of the tape")
+        told(f"10 m are {length_m:.2f} m after 4 clicks on the reference and 2 of the tape")
         assert length_m == pytest.approx(10.0, rel=0.02)
         browser.page.click("#save")
         browser.page.wait_for_selector("save-panel code")
@@ -156,7 +158,12 @@ def test_a_corner_is_dragged_and_moved_by_keys_and_the_answer_follows(corners_px
         page.keyboard.press("Shift+ArrowRight")
         assert float(grip.get_attribute("cx")) == pytest.approx(before + 1.1, abs=0.01)
         took_ms: list[float] = []
-        page.on("requestfinished", lambda one: "/api/ground" in one.url and took_ms.append(one.timing["responseEnd"]))
+
+        def finished(request: Any) -> None:
+            if "/api/ground" in request.url:
+                took_ms.append(request.timing["responseEnd"])
+
+        page.on("requestfinished", finished)
         box = grip.bounding_box()
         page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
         page.mouse.down()
@@ -165,7 +172,7 @@ def test_a_corner_is_dragged_and_moved_by_keys_and_the_answer_follows(corners_px
             page.wait_for_timeout(50)
         page.mouse.up()
         page.wait_for_timeout(1500)
-        print(f"a dragged corner is answered in {median(took_ms):.0f} ms, {len(took_ms)} answers")
+        told(f"a dragged corner is answered in {median(took_ms):.0f} ms, {len(took_ms)} answers")
         assert len(took_ms) >= 5
 
 
@@ -173,7 +180,10 @@ def test_a_corner_is_dragged_and_moved_by_keys_and_the_answer_follows(corners_px
 def test_both_pages_can_be_used_by_everybody(
     look: dict[str, Any], corners_px: FloatArray, run: Path, tmp_path: Path
 ) -> None:
-    with served("setup", DEMO / "video.mp4", "--config", tmp_path / "site.yaml") as (address, _), browsing(**look) as browser:
+    with (
+        served("setup", DEMO / "video.mp4", "--config", tmp_path / "site.yaml") as (address, _),
+        browsing(**look) as browser,
+    ):
         browser.page.goto(address)
         browser.page.wait_for_selector(f"{PICTURE} image")
         click_reference(browser, corners_px, np.random.default_rng(2))
@@ -239,9 +249,11 @@ def test_a_hazard_is_jumped_to_and_judged(run: Path) -> None:
         page.check("input[value=false_alarm]")
         page.fill("textarea[name=comment]", "a sign")
         page.keyboard.press("Tab")
-        page.wait_for_function("() => document.querySelector('review-page').shadowRoot.querySelector('hazard-list').view.chosen.comment")
+        page.wait_for_function(f"() => {FILM_VIEW}.view.chosen.comment")
         page.check("input[name=unjudged]")
-        assert page.locator("hazard-list li").count() == len(json.loads((run / "run.json").read_text())["counts"]["hazards"])
+        assert page.locator("hazard-list li").count() == len(
+            json.loads((run / "run.json").read_text())["counts"]["hazards"]
+        )
         page.uncheck("input[name=danger]")
         assert page.locator("hazard-list li button", has_text="danger").count() == 0
         page.click("#play")
@@ -258,14 +270,13 @@ def test_a_film_plays_and_the_overlays_go_with_it(played: Path) -> None:
     with served("open", played, "--film", DEMO / "video.mp4") as (address, _), browsing() as browser:
         page = browser.page
         page.goto(address)
-        page.wait_for_function("() => document.querySelector('review-page')?.shadowRoot.querySelector('film-view')?.shadowRoot.querySelector('video')?.readyState > 2")
+        page.wait_for_function(f"() => {FILM_VIEW}?.shadowRoot.querySelector('video')?.readyState > 2")
         page.click("#play")
         page.wait_for_timeout(1200)
         page.click("#play")
         page.wait_for_timeout(500)
         shown_s, film_s = page.evaluate(
-            "() => { const view = document.querySelector('review-page').shadowRoot.querySelector('film-view');"
-            " return [view.view.timeS, view.shadowRoot.querySelector('video').currentTime]; }"
+            f"() => [{FILM_VIEW}.view.timeS, {FILM_VIEW}.shadowRoot.querySelector('video').currentTime]"
         )
         assert shown_s > 0.2 and film_s == pytest.approx(shown_s, abs=0.06)
         assert page.locator("film-view svg rect").count() >= 1
@@ -283,8 +294,6 @@ def test_a_port_that_is_taken_is_said_in_one_line(tmp_path: Path, run: Path) -> 
 
 def test_the_page_is_small() -> None:
     """Compressed, both pages together."""
-    from service.browser import BUILT
-
     packed = subprocess.run(["gzip", "-c", *BUILT.glob("*.js")], capture_output=True, check=True).stdout
-    print(f"{len(packed) / 1000:.0f} kB")
+    told(f"{len(packed) / 1000:.0f} kB")
     assert len(packed) < 250_000

@@ -189,9 +189,9 @@ def test_what_is_no_run_is_refused_in_one_line(run: Path, tmp_path: Path) -> Non
     assert "\n" not in str(caught.value)
     (run / "run.json").write_text("{")
     for folder in (run, tmp_path / "none", tmp_path):
-        with pytest.raises(StandoffError) as caught:
+        with pytest.raises(StandoffError) as refused:
             open_review(folder, None, OpenPages())
-        assert "\n" not in str(caught.value)
+        assert "\n" not in str(refused.value)
 
 
 def test_places_that_are_counted_anew_are_said_to_be_so(run: Path) -> None:

@@ -117,7 +117,7 @@ def test_four_surveyed_points_do_as_well(sight: Sight, view: View) -> None:
 def test_zones_lie_where_they_were_drawn(sight: Sight, corners_px: FloatArray) -> None:
     draft = clicked(corners_px, 8)
     ring_px = [(500.0, 500.0), (900.0, 500.0), (900.0, 900.0), (500.0, 900.0)]
-    ring_m = sight.places(0.0, draft, [tuple(one) for one in ring_px])
+    ring_m = sight.places(0.0, draft, ring_px)
     draft.zones = [ZoneDraft(name="pit", kind="no_go", ring_m=[place for place in ring_m if place])]
     drawn_px = np.array(sight.answer(0.0, draft).zones_px[0])
     for corner in ring_px:
@@ -128,7 +128,7 @@ def test_the_plan_is_the_ground_from_above(sight: Sight, view: View, corners_px:
     draft = clicked(corners_px, 9)
     about = sight.answer(0.0, draft).plan
     picture = cv2.imdecode(np.frombuffer(sight.plan_jpeg(0.0, draft), np.uint8), cv2.IMREAD_COLOR)
-    assert about is not None and picture.shape == (about.height_px, about.width_px, 3)
+    assert about is not None and picture is not None and picture.shape == (about.height_px, about.width_px, 3)
     scale = np.linalg.svd(np.array(about.to_plan)[:2, :2], compute_uv=False)
     np.testing.assert_allclose(scale, 1.0 / about.m_per_px, rtol=1e-6)
 

@@ -38,7 +38,9 @@ def open_review(folder: Path, film: Path | None, pages: OpenPages) -> ReviewPage
     return ReviewPage(run, pictures, why_not, pages)
 
 
-def serve_review(folder: Path, film: Path | None, port: int, tell: Callable[[str], None], *, opens_browser: bool) -> None:
+def serve_review(
+    folder: Path, film: Path | None, port: int, tell: Callable[[str], None], *, opens_browser: bool
+) -> None:
     """Show the page until it is closed.
 
     Args:

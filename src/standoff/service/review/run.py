@@ -109,7 +109,10 @@ class FinishedRun:
         Raises:
             DataError: A table is broken.
         """
-        pairs, frames = self._whole("proximity", ("time_s", "gap_m")), self._whole("frames", ("time_s", "watched_share"))
+        pairs, frames = (
+            self._whole("proximity", ("time_s", "gap_m")),
+            self._whole("frames", ("time_s", "watched_share")),
+        )
         edges_s = np.unique(frames["time_s"].astype(np.float64))
         if len(edges_s) > _CURVE_POINTS:
             edges_s = np.linspace(self.first_s, self.last_s, _CURVE_POINTS, endpoint=False)
@@ -243,9 +246,7 @@ def _track(row: dict[str, Any], ground: AnyGround, severity: Severity | None) ->
     )
 
 
-def _worth_showing(
-    pairs: Sequence[dict[str, Any]], worst: dict[tuple[int, ...], Severity]
-) -> Iterator[dict[str, Any]]:
+def _worth_showing(pairs: Sequence[dict[str, Any]], worst: dict[tuple[int, ...], Severity]) -> Iterator[dict[str, Any]]:
     """Yield those of a hazard, and of the others the nearest."""
     in_hazard = [row for row in pairs if (row["track_a"], row["track_b"]) in worst]
     yield from in_hazard

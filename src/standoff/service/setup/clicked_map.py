@@ -37,7 +37,7 @@ def clicked_map(corners_px: FloatArray, corners_m: FloatArray, height_m: float, 
     view = View(seen.camera, seen.position_m + np.array([0.0, 0.0, height_m]), seen.site_to_camera)
     return map_from_view(
         view,
-        np.linalg.inv(belief.information[:CHANGES, :CHANGES]),
+        np.asarray(np.linalg.inv(belief.information[:CHANGES, :CHANGES]), dtype=np.float64),
         method="clicked corners",
         scale_m_per_px=float(np.sqrt(_area(corners_m) / _area(corners_px))),
         anchors_px=corners_px,

@@ -57,7 +57,9 @@ class PointDraft(_Part):
     name: str = Field(min_length=1, max_length=60)
     at_px: Pixel | None = Field(default=None, description="null: not clicked yet.")
     m: Place | None = None
-    lonlat: tuple[Annotated[float, Field(ge=-180, le=180)], Annotated[float, Field(ge=-90, le=90)]] | None = Field(default=None, description="Degrees (WGS 84), in place of `m`.")
+    lonlat: tuple[Annotated[float, Field(ge=-180, le=180)], Annotated[float, Field(ge=-90, le=90)]] | None = Field(
+        default=None, description="Degrees (WGS 84), in place of `m`."
+    )
     z_m: float | None = Field(default=None, ge=-1e4, le=1e4)
 
 
@@ -134,16 +136,16 @@ class Draft(_Part):
             # The sides were typed as the corners were clicked: the last one is now the first.
             sides = len(lengths) - (reference.shape == "sides")
             lengths[:sides] = reversed(lengths[:sides])
-        shape: dict[str, Any] = {
-            "square": lambda: {"square_m": lengths[0]},
-            "rectangle": lambda: {"rectangle_m": lengths},
-            "sides": lambda: {"sides_m": lengths[:4], "diagonal_m": lengths[4]},
-        }[reference.shape]()
+        said: dict[Shape, dict[str, Any]] = {
+            "square": {"square_m": lengths[0]},
+            "rectangle": {"rectangle_m": lengths},
+            "sides": {"sides_m": lengths[:4], "diagonal_m": lengths[-1]},
+        }
         low, high = corners_px.min(axis=0), corners_px.max(axis=0)
         grows_px = _GROWS_BY * float((high - low).max())
         box = [*(low - grows_px), *(high + grows_px)]
         return {
-            **shape,
+            **said[reference.shape],
             "height_m": reference.height_m,
             "box_px": [round(float(edge), 1) for edge in box],
             "box_time_s": round(reference.time_s, 3),

@@ -116,7 +116,9 @@ class Sight:
         """
         missing = draft.missing()
         if missing:
-            raise ConfigError(expected="a draft that tells the metres", found=f"still to do: {missing}", fix="complete it")
+            raise ConfigError(
+                expected="a draft that tells the metres", found=f"still to do: {missing}", fix="complete it"
+            )
         survey, zones = (Path(self._folder.name) / name for name in ("survey.yaml", "zones.geojson"))
         own = draft.settings(survey, zones)
         if draft.ground == "survey":
@@ -365,7 +367,7 @@ def _contours(ground: GroundMap, size_px: tuple[int, int], unit: LengthUnit) -> 
     lines = contourpy.contour_generator(columns, rows, np.log(sigma_m))
     found = ((level, lines.lines(float(np.log(level)))) for level in _LEVELS_M)
     return [
-        Contour(sigma_m=level, text=unit.limit(level), lines_px=[_pixels(line) for line in parts])
+        Contour(sigma_m=level, text=unit.limit(level), lines_px=[_pixels(np.array(line)) for line in parts])
         for level, parts in found
         if len(parts)
     ]
