@@ -27,9 +27,10 @@ PUBLIC_NAMES = {
     },
     "standoff.config": {
         "GroundSettings", "MarkerSettings", "ReferenceSettings", "Replacement", "STAGE_NAMES", "Settings",
-        "SiteSettings", "StreamSettings", "build_ground", "build_marker_observer", "build_replacement", "build_stage",
+        "SiteSettings", "StreamSettings", "anchor_paths", "build_ground", "build_marker_observer", "build_replacement", "build_stage",
         "build_watcher", "build_zones", "import_factory", "load_settings", "load_site", "named_files", "read_params",
-        "read_settings_file", "recorded_settings", "resolved", "site_origin",
+        "read_settings_file", "recorded_settings", "resolved", "settings_from",
+        "site_origin",
     },
     "standoff.evaluation.coverage": {
         "ClipSamples", "CoverageResult", "PairRow", "PairSamples", "PositionRow", "PositionSamples",
@@ -55,6 +56,8 @@ PUBLIC_NAMES = {
         "write_overview", "write_tables",
     },
     "standoff.schemas": {"SCHEMAS"},
+    "standoff.service.review": {"ReviewPage", "open_review", "review_app", "serve_review"},
+    "standoff.service.setup": {"Draft", "SetupPage", "open_setup", "serve_setup", "setup_app"},
     "standoff.stages.detect": {
         "BOXES_OUTPUT", "CLASS_INPUT", "CROPS_INPUT", "Candidates", "DetectParams", "Letterbox", "ModelCard",
         "Network", "ONNX_ERRORS", "OnnxDetector", "PICTURE_INPUT", "POINTS_OUTPUT", "POINT_CLASSES",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from cli.test_cli import make_video
 from files.test_zone_file import collection, feature
 
 from standoff.clips import RunFolder
+from standoff.clips.reviews import REVIEW_FILE, VERDICTS, Review, add_review
 from standoff.config import load_settings
 from standoff.core.errors import DataError
 from standoff.core.outputs import OUTPUTS, RECORD_FILE, RUN_FILES, SCHEMA_VERSION, ZONES_FILE
@@ -76,7 +78,14 @@ def test_every_schema_is_one(name: str) -> None:
 def test_every_file_of_a_run_that_programs_read_has_a_schema() -> None:
     for_people = {OUTPUTS["video"], OUTPUTS["report"]}
     described = {schema()["title"].partition(",")[0] for schema in SCHEMAS.values()}
-    assert described == {*RUN_FILES} - for_people
+    assert described == {*RUN_FILES, REVIEW_FILE} - for_people
+
+
+def test_what_people_say_of_a_hazard_is_what_its_schema_says(tmp_path: Path) -> None:
+    for verdict in VERDICTS:
+        add_review(tmp_path, Review("01M8", verdict, 2.5, "Ärger", datetime.now(UTC)))
+    for line in (tmp_path / REVIEW_FILE).read_text(encoding="utf-8").splitlines():
+        check("review", json.loads(line))
 
 
 @pytest.mark.parametrize("name", TABLES)

@@ -9,6 +9,7 @@ import { clock, ReviewPart, TONES } from "./review-part";
 type Pixel = [number, number];
 const SPEEDS = [0.25, 0.5, 1, 2, 4];
 const TEXT_SHARE = 0.015;
+const LEAST_TEXT_PX = 12;
 const LETTER_SHARE = 0.55;
 
 @customElement("film-view")
@@ -207,7 +208,8 @@ export class FilmView extends ReviewPart {
   }
 
   private overlays(frame: FrameAt, widthPx: number): SVGTemplateResult {
-    const size = TEXT_SHARE * widthPx;
+    // On a small screen letters stay readable, and fewer of them find room.
+    const size = Math.max(TEXT_SHARE * widthPx, (LEAST_TEXT_PX * widthPx) / (this.clientWidth || widthPx));
     const thin = widthPx / 900;
     const labels = new Labels(size, widthPx);
     return svg`

@@ -1,13 +1,15 @@
 /** The hazards of the run: filtered, jumped to, judged. */
 
 import { css, html, nothing } from "lit";
-import { customElement } from "lit/decorators.js";
+import { customElement, state } from "lit/decorators.js";
 import type { Word } from "../shared/words";
 import type { HazardAnswer, Severity, Verdict } from "./questions";
 import { clock, ReviewPart, TONES } from "./review-part";
 
 const SEVERITIES: Severity[] = ["danger", "warning", "unknown"];
 const VERDICTS: Verdict[] = ["open", "right", "false_alarm", "unsure"];
+/** More are too long a list to be drawn at once, and to be read. */
+const ROWS = 200;
 const MARKS: Record<Verdict, string> = { open: "", right: "✓", false_alarm: "✗", unsure: "?" };
 
 @customElement("hazard-list")
@@ -60,6 +62,8 @@ export class HazardList extends ReviewPart {
     `,
   ];
 
+  @state() private rows = ROWS;
+
   override render() {
     const { view } = this;
     const { run, shown, chosen } = view;
@@ -80,8 +84,9 @@ export class HazardList extends ReviewPart {
       </div>
       <p class="quiet" aria-live="polite">${this.say("hazardsShown", { n: shown.length, all: run.hazards.length })}</p>
       <ol>
-        ${shown.map((one) => this.row(one))}
+        ${shown.slice(0, this.rows).map((one) => this.row(one))}
       </ol>
+      ${shown.length > this.rows ? html`<button @click=${() => (this.rows += ROWS)}>${this.say("moreHazards", { n: Math.min(ROWS, shown.length - this.rows) })}</button>` : nothing}
       ${chosen ? this.judging(chosen) : nothing}
     `;
   }

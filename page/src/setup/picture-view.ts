@@ -410,7 +410,7 @@ export class PictureView extends SetupPart {
         <circle
           class="grip" cx=${x} cy=${y} r=${8 * this.screenPx} fill="#4df3ff" fill-opacity="0.25" stroke="#4df3ff" stroke-width=${2 * this.screenPx}
           tabindex="0" role="button" aria-label=${name} data-grip=${`${grip.kind}-${grip.index}`}
-          @pointerdown=${(event: PointerEvent) => this.press(event, grip)}
+          @pointerdown=${(event: PointerEvent) => this.press(event, this.site.tool === "corners" ? grip : undefined)}
           @keydown=${(event: KeyboardEvent) => this.key(event, grip)}
         ></circle>
         <circle cx=${x} cy=${y} r=${1.2 * this.screenPx} fill="#4df3ff" pointer-events="none"></circle>

@@ -25,6 +25,7 @@ RunTable = Literal["tracks", "proximity", "frames"]
 
 _RECORD: Final = "run.json"
 _HAZARDS: Final = "hazards.jsonl"
+_HAZARD_FIELDS: Final = tuple(field.name for field in fields(Hazard))
 _UNKNOWN_NUMBERS: Final = ("distance_m", "gap_m", "sigma_m", "breach_now", "breach_ahead")
 
 
@@ -148,7 +149,7 @@ class RunFolder:
 
 
 def _event(told: Mapping[str, Any]) -> Hazard:
-    known = {field.name: told[field.name] for field in fields(Hazard) if field.name in told}
+    known = {name: told[name] for name in _HAZARD_FIELDS if name in told}
     # Earlier runs lack the probabilities, which are unknown then.
     given = [name for name in _UNKNOWN_NUMBERS if name in known]
     numbers: dict[str, Any] = {name: np.nan if known[name] is None else float(known[name]) for name in given}

@@ -1,10 +1,11 @@
-"""A line of a run's hazards as JSON Schema."""
+"""A line of a run's hazards, and of what people say of them, as JSON Schema."""
 
 from __future__ import annotations
 
 from typing import Any
 
 from standoff.clips import FRAME_COLUMNS, schema_of
+from standoff.clips.reviews import Review
 from standoff.core.hazards import Hazard
 from standoff.schemas.documented import dataclass_properties
 from standoff.schemas.rows import row_schema
@@ -27,4 +28,15 @@ def event_schema() -> dict[str, Any]:
         "description": "Frame and times are those of the event; null where it was said before the first frame.",
         "properties": properties,
         "required": [name for name in properties if name != "zone"],
+    }
+
+
+def review_schema() -> dict[str, Any]:
+    """Return what one line of a run's reviews is; the last one of a hazard counts."""
+    properties = dataclass_properties(Review)
+    return {
+        "type": "object",
+        "description": "What somebody says of a hazard; lines are only ever added.",
+        "properties": properties,
+        "required": [*properties],
     }

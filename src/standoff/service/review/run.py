@@ -34,6 +34,8 @@ _TURNS: Final = np.linspace(0.0, 2.0 * np.pi, 25)
 _CIRCLE: Final = np.column_stack([np.cos(_TURNS), np.sin(_TURNS)])
 _OUTLIERS: Final = (1.0, 99.0)
 """Per cent of places that the plan need not show."""
+_PLACES: Final = 50_000
+"""So many are enough to know what those are."""
 _PLAN_MARGIN_M: Final = 1.0
 
 _TRACKS: Final = (
@@ -97,8 +99,9 @@ class FinishedRun:
         known = np.isfinite(tracks["x_m"]) & np.isfinite(tracks["y_m"])
         if not known.any():
             return None
-        places_m = np.column_stack([tracks["x_m"], tracks["y_m"]])[known]
-        radius_m = tracks["radius_m"][known, None]
+        some = np.flatnonzero(known)[:: max(1, int(known.sum()) // _PLACES)]
+        places_m = np.column_stack([tracks["x_m"][some], tracks["y_m"][some]])
+        radius_m = tracks["radius_m"][some, None]
         left, low = np.percentile(places_m - radius_m, _OUTLIERS[0], axis=0).tolist()
         right, high = np.percentile(places_m + radius_m, _OUTLIERS[1], axis=0).tolist()
         return left - _PLAN_MARGIN_M, low - _PLAN_MARGIN_M, right + _PLAN_MARGIN_M, high + _PLAN_MARGIN_M
