@@ -4,7 +4,7 @@
 # make test-processors   the numeric tests as older processors would compute; TESTS=... for others
 # make licences   of all that a runtime install brings, against an allow list; writes dist/standoff.cdx.json (CycloneDX)
 # make bundle   a folder in dist/ that installs without a network: wheels for this platform, detector, docs; EXTRAS=scale for more
-# make page   the page of `standoff setup`, built with Node; before `pip install .`, or in place for an editable one
+# make page   the pages of `standoff setup` and `standoff open`, built with Node; before `pip install .`, or in place for an editable one
 # make docs   the documentation as a site in site/; a dead link fails
 # make coverage   how much of the packages that run on site their own tests reach
 # make fuzz   the laws with many more examples, and others each time; prints how to repeat a failure

@@ -27,7 +27,8 @@ PUBLIC_NAMES = {
     },
     "standoff.config": {
         "GroundSettings", "MarkerSettings", "ReferenceSettings", "Replacement", "STAGE_NAMES", "Settings",
-        "SiteSettings", "StreamSettings", "anchor_paths", "build_ground", "build_marker_observer", "build_replacement", "build_stage",
+        "SiteSettings", "StreamSettings", "anchor_paths", "build_ground", "build_marker_observer",
+        "build_replacement", "build_stage",
         "build_watcher", "build_zones", "import_factory", "load_settings", "load_site", "named_files", "read_params",
         "read_settings_file", "recorded_settings", "resolved", "settings_from",
         "site_origin",
