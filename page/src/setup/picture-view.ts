@@ -3,7 +3,8 @@
 import { css, html, nothing, svg, type SVGTemplateResult } from "lit";
 import { customElement, query, state } from "lit/decorators.js";
 import { SetupPart } from "./setup-part";
-import { ask, type GroundAnswer, type Pixel } from "./questions";
+import { PictureMarks } from "./picture-marks";
+import { ask, type Pixel } from "./questions";
 
 const CLICK_MOVES_PX = 4;
 const MOST_ZOOM = 12;
@@ -317,69 +318,23 @@ export class PictureView extends SetupPart {
     return [left + width / 2, top + height / 2];
   }
 
+  private get marks(): PictureMarks {
+    return new PictureMarks(this.site.film!, this.screenPx, (word) => this.say(word));
+  }
+
   private overlays(): SVGTemplateResult {
     const ground = this.site.ground;
     return svg`
-      ${ground && this.showsWatched ? this.unwatched(ground) : nothing}
-      ${ground && this.showsErrors ? this.contours(ground) : nothing}
-      ${ground && this.showsCircles ? this.circles(ground) : nothing}
-      ${ground?.zones_px.map((ring) => this.line(ring as Pixel[], "#ff8fd0", 2)) ?? nothing}
-      ${ground?.solid_px.map((line) => this.line(line as Pixel[], "#4df3ff", 2)) ?? nothing}
-      ${this.line(this.site.openZone, "#ff8fd0", 2)}
+      ${ground && this.showsWatched ? this.marks.unwatched(ground) : nothing}
+      ${ground && this.showsErrors ? this.marks.contours(ground) : nothing}
+      ${ground && this.showsCircles ? this.marks.circles(ground) : nothing}
+      ${ground?.zones_px.map((ring) => this.marks.line(ring as Pixel[], "#ff8fd0", 2)) ?? nothing}
+      ${ground?.solid_px.map((line) => this.marks.line(line as Pixel[], "#4df3ff", 2)) ?? nothing}
+      ${this.marks.line(this.site.openZone, "#ff8fd0", 2)}
       ${this.site.openZone.map(([x, y]) => svg`<circle cx=${x} cy=${y} r=${4 * this.screenPx} fill="#ff8fd0"></circle>`)}
       ${this.tapeLine()}
       ${this.grips()}
     `;
-  }
-
-  private line(points: Pixel[], colour: string, width: number, dashes = ""): SVGTemplateResult {
-    const path = points.map(([x, y]) => `${x},${y}`).join(" ");
-    return svg`
-      <polyline points=${path} fill="none" stroke="#000" stroke-opacity="0.6" stroke-width=${(width + 2) * this.screenPx}></polyline>
-      <polyline points=${path} fill="none" stroke=${colour} stroke-width=${width * this.screenPx} stroke-dasharray=${dashes}></polyline>
-    `;
-  }
-
-  private label(at: Pixel, text: string, anchor = "start"): SVGTemplateResult {
-    const size = 14 * this.screenPx;
-    return svg`<text x=${at[0]} y=${at[1]} font-size=${size} stroke-width=${size / 4} text-anchor=${anchor}>${text}</text>`;
-  }
-
-  private unwatched(ground: GroundAnswer): SVGTemplateResult {
-    const watched = ground.watched;
-    const film = this.site.film!;
-    if (!watched) return svg``;
-    const width = film.width_px / watched.columns;
-    const height = film.height_px / watched.rows;
-    const cells = watched.cells.flatMap((row, r) => row.map((reason, c) => [r, c, reason] as const)).filter(([, , reason]) => reason > 0);
-    return svg`${cells.map(
-      ([r, c, reason]) => svg`
-        <rect x=${c * width - 0.5} y=${r * height - 0.5} width=${width} height=${height} fill="url(#hatch)">
-          <title>${watched.reasons[reason] ?? ""}</title>
-        </rect>`,
-    )}`;
-  }
-
-  private contours(ground: GroundAnswer): SVGTemplateResult {
-    return svg`${ground.contours.map((contour) =>
-      contour.lines_px.map((points) => {
-        const line = points as Pixel[];
-        const middle = line[Math.floor(line.length / 2)];
-        return svg`${this.line(line, "#ffe08a", 1.5, `${8 * this.screenPx} ${5 * this.screenPx}`)}
-          ${middle ? this.label(middle, `± ${contour.text}`) : nothing}`;
-      }),
-    )}`;
-  }
-
-  private circles(ground: GroundAnswer): SVGTemplateResult {
-    return svg`${ground.entities.map((one) => {
-      const [left, top, right, bottom] = one.box_px;
-      return svg`
-        <rect x=${left} y=${top} width=${right - left} height=${bottom - top} fill="none" stroke="#fff" stroke-width=${this.screenPx}></rect>
-        ${this.line(one.circle_px as Pixel[], "#b7f36b", 1.5)}
-        ${this.label([left, top - 4 * this.screenPx], this.say(one.kind as "worker"))}
-      `;
-    })}`;
   }
 
   private tapeLine(): SVGTemplateResult {
@@ -388,9 +343,9 @@ export class PictureView extends SetupPart {
     if (!from) return svg``;
     const end = to ?? from;
     return svg`
-      ${this.line([from, end], "#ffffff", 2.5)}
+      ${this.marks.line([from, end], "#ffffff", 2.5)}
       ${[from, end].map(([x, y]) => svg`<circle cx=${x} cy=${y} r=${4 * this.screenPx} fill="#fff" stroke="#000" stroke-width=${this.screenPx}></circle>`)}
-      ${tape ? this.label([(from[0] + end[0]) / 2, (from[1] + end[1]) / 2 - 8 * this.screenPx], tape.text || this.say("tapeNone"), "middle") : nothing}
+      ${tape ? this.marks.label([(from[0] + end[0]) / 2, (from[1] + end[1]) / 2 - 8 * this.screenPx], tape.text || this.say("tapeNone"), "middle") : nothing}
     `;
   }
 
@@ -414,7 +369,7 @@ export class PictureView extends SetupPart {
           @keydown=${(event: KeyboardEvent) => this.key(event, grip)}
         ></circle>
         <circle cx=${x} cy=${y} r=${1.2 * this.screenPx} fill="#4df3ff" pointer-events="none"></circle>
-        ${this.label([x + 10 * this.screenPx, y - 10 * this.screenPx], grip.kind === "corner" ? String(grip.index + 1) : name)}
+        ${this.marks.label([x + 10 * this.screenPx, y - 10 * this.screenPx], grip.kind === "corner" ? String(grip.index + 1) : name)}
       `,
     )}`;
   }

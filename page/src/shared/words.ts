@@ -80,6 +80,7 @@ const ENGLISH = {
   dump_truck: "Dump truck",
   roller_or_dozer: "Roller or dozer",
   vehicle: "Vehicle",
+  reference: "Reference",
   trial: "Try it",
   trialRun: "Run ten seconds from here",
   trialStop: "Stop",
@@ -221,6 +222,7 @@ const GERMAN: Record<Word, string> = {
   dump_truck: "Muldenkipper",
   roller_or_dozer: "Walze oder Raupe",
   vehicle: "Fahrzeug",
+  reference: "Referenz",
   trial: "Ausprobieren",
   trialRun: "Zehn Sekunden ab hier auswerten",
   trialStop: "Anhalten",
@@ -290,8 +292,8 @@ export function usualLanguage(): Language {
   return asked.find((one): one is Language => one !== undefined && one in LANGUAGES) ?? "en";
 }
 
-/** Return a word with what belongs into its braces. */
+/** Return a word with what belongs into its braces; a name that the server says and no catalogue has, as it is. */
 export function say(language: Language, word: Word, parts: Record<string, string | number> = {}): string {
-  const text: string = LANGUAGES[language].words[word];
+  const text: string = LANGUAGES[language].words[word] ?? word.replaceAll("_", " ");
   return text.replace(/\{(\w+)\}/g, (_, name: string) => String(parts[name] ?? ""));
 }

@@ -13,7 +13,7 @@ import cv2
 
 from standoff.core.camera import CameraPrior
 from standoff.core.errors import SourceError
-from standoff.core.types import Frame
+from standoff.core.types import Frame, ImageArray
 from standoff.stages.frames import SourceParams, open_source
 
 _KEPT: Final = 6
@@ -99,7 +99,7 @@ class FilmPictures:
         return jpeg_of(frame.image, _JPEG_QUALITY), frame
 
 
-def jpeg_of(image: Any, quality: int) -> bytes:  # noqa: ANN401
+def jpeg_of(image: ImageArray, quality: int) -> bytes:
     """Return (H, W, 3) uint8 BGR as the bytes of a JPEG."""
     coded, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])
     assert coded

@@ -53,7 +53,6 @@ def serve_review(
     Raises:
         StandoffError: The page was not built, the port is taken, or the run or its film cannot be used.
     """
-    built = page_folder()
     pages = OpenPages()
-    app = review_app(open_review(folder, film, pages), pages, built)
+    app = review_app(open_review(folder, film, pages), pages, page_folder())
     serve_page(app, pages, port, tell, opens_browser=opens_browser)

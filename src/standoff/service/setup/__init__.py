@@ -80,10 +80,9 @@ def serve_setup(film: Path, site_file: Path, port: int, tell: Callable[[str], No
     Raises:
         StandoffError: The page was not built, the port is taken, or film or settings cannot be used.
     """
-    folder = page_folder()
     pages = OpenPages()
     page = open_setup(film, site_file, pages)
     try:
-        serve_page(setup_app(page, pages, folder), pages, port, tell, opens_browser=opens_browser)
+        serve_page(setup_app(page, pages, page_folder()), pages, port, tell, opens_browser=opens_browser)
     finally:
         page.close()

@@ -29,6 +29,8 @@ Shape: TypeAlias = Literal["square", "rectangle", "sides"]
 Metres: TypeAlias = Annotated[float, Field(gt=0, le=1000)]
 SHAPE_LENGTHS: Final = {"square": 1, "rectangle": 2, "sides": 5}
 """How many lengths each shape has: side; length and width; four sides in order and the first diagonal."""
+SAME_S: Final = 1e-3
+"""Times this near to each other are of one picture."""
 _CORNERS: Final = 4
 _GROWS_BY: Final = 0.12
 """The box about clicked corners is so much larger than they, in longer sides of it: the sides below the top count."""

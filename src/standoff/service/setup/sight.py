@@ -11,16 +11,13 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
 
-import contourpy
 import numpy as np
 
 from standoff.config import Settings, build_ground, build_stage, build_watcher, settings_from
-from standoff.core.classes import CLASSES, Role, class_ids
+from standoff.core.classes import Role, class_ids
 from standoff.core.errors import ConfigError, GroundError, StandoffError
-from standoff.core.homography import FloatArray
-from standoff.core.lengths import UNITS, LengthUnit
+from standoff.core.lengths import UNITS
 from standoff.core.map_error import map_jacobian, picture_jacobian
-from standoff.core.pose import view_from_homography
 from standoff.core.protocols import AnyGround, Ground
 from standoff.core.types import (
     Detections,
@@ -30,40 +27,35 @@ from standoff.core.types import (
     NoCameraMotion,
     NoGroundMap,
     Tracks,
-    WatchedGround,
 )
-from standoff.core.watched_ground import REASONS
-from standoff.drawing.ground_window import GroundWindow, camera_up, rectify, seen_ground_m, window_around
+from standoff.drawing.ground_window import rectify
 from standoff.files.yaml_text import write_yaml
 from standoff.files.zone_file import write_zones
 from standoff.service.pictures import jpeg_of
-from standoff.service.setup.answers import (
-    Contour,
-    Entity,
-    GroundAnswer,
-    Plan,
-    Point,
-    TapeAnswer,
-    Watched,
-)
+from standoff.service.setup.answers import GroundAnswer, TapeAnswer
 from standoff.service.setup.clicked_map import clicked_map
-from standoff.service.setup.draft import Draft, Pixel, corners_in_order
+from standoff.service.setup.draft import SAME_S, Draft, Pixel, corners_in_order
 from standoff.service.setup.film import Film
+from standoff.service.setup.shown import (
+    camera_height,
+    contours_of,
+    entities_of,
+    off_px,
+    pixels_of,
+    place_of,
+    plan_of,
+    ring_px,
+    solid_px,
+    watched_of,
+    window_of,
+)
 
 _ALONE: Final = NoCameraMotion("one picture alone")
 _KEPT: Final = 8
 _SURE_SCORE: Final = 0.3
-_LEVELS_M: Final = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0)
-_CONTOUR_CELLS: Final = 64
-_PLAN_PX: Final = 560
 _PLAN_QUALITY: Final = 85
 _CLICK_SIGMA_PX: Final = 1.0
 """How well a hand with a magnifier puts a point of the tape."""
-_TURNS: Final = np.linspace(0.0, 2.0 * np.pi, 49)
-_CIRCLE: Final = np.column_stack([np.cos(_TURNS), np.sin(_TURNS)])
-_EDGE_STEPS: Final = 16
-_SAME_S: Final = 1e-3
-"""Times this near to each other are of one picture."""
 _ANYWHERE_PX: Final = [(0.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, 0.0)]
 
 
@@ -152,7 +144,7 @@ class Sight:
     def _at_once(self, time_s: float, draft: Draft) -> Seen | None:
         """Look with the clicked corners as they are; None: there are none in this picture."""
         frame, reference = self.film.frame(time_s), draft.reference
-        if draft.ground != "reference" or abs(reference.time_s - frame.time_s) > _SAME_S:
+        if draft.ground != "reference" or abs(reference.time_s - frame.time_s) > SAME_S:
             return None
         corners_px, _ = corners_in_order(reference.corners_px)
         # The corners are all that changes while one of them is dragged: the rest is checked once.
@@ -199,7 +191,7 @@ class Sight:
         ground = seen.ground
         unit = UNITS[draft.unit]
         tracks, positions = _placed(seen, ground)
-        entities = _entities(tracks, positions, ground)
+        entities = entities_of(tracks, positions, ground)
         if isinstance(ground, NoGroundMap):
             return GroundAnswer(
                 time_s=seen.frame.time_s, found=False, missing="", reason=ground.reason, warnings=warnings,
@@ -215,15 +207,15 @@ class Sight:
             reason="",
             method=ground.method,
             is_rough=rough is not None,
-            solid_px=_solid_px(seen, ground, top_px),
-            corners_px=_pixels(top_px),
-            off_px=_off_px(draft, top_px, seen.frame.time_s),
-            camera_height_text=_camera_height(ground, unit),
-            contours=_contours(ground, self.film.size_px, unit),
-            watched=_watched(watched),
-            plan=_plan(_window(ground)),
+            solid_px=solid_px(seen.settings.ground.reference, ground, top_px),
+            corners_px=pixels_of(top_px),
+            off_px=off_px(draft, top_px, seen.frame.time_s),
+            camera_height_text=camera_height(ground, unit),
+            contours=contours_of(ground, self.film.size_px, unit),
+            watched=watched_of(watched),
+            plan=plan_of(window_of(ground)),
             entities=entities,
-            zones_px=[_ring_px(ground, np.array(zone.ring_m)) for zone in draft.zones if len(zone.ring_m) >= 2],
+            zones_px=[ring_px(ground, np.array(zone.ring_m)) for zone in draft.zones if len(zone.ring_m) >= 2],
             warnings=warnings,
         )
 
@@ -236,7 +228,7 @@ class Sight:
         seen = self.see(time_s, draft)
         if isinstance(seen.ground, NoGroundMap):
             raise GroundError(expected="a ground map", found=seen.ground.reason, fix="click the reference's corners")
-        window = _window(seen.ground)
+        window = window_of(seen.ground)
         if window is None:
             raise GroundError(expected="ground in the picture", found="none", fix="choose another picture")
         onto = np.full((window.size_px[1], window.size_px[0], 3), 32, dtype=np.uint8)
@@ -269,8 +261,8 @@ class Sight:
             length_m=length_m,
             sigma_m=sigma_m,
             text=UNITS[draft.unit].distance(length_m, sigma_m),
-            from_m=_point(ends_m[0]),
-            to_m=_point(ends_m[1]),
+            from_m=place_of(ends_m[0]),
+            to_m=place_of(ends_m[1]),
         )
 
     def places(self, time_s: float, draft: Draft, at_px: list[Pixel]) -> list[tuple[float, float] | None]:
@@ -279,7 +271,7 @@ class Sight:
         if ground is None or isinstance(ground, NoGroundMap) or not at_px:
             return [None] * len(at_px)
         points_m, on_ground = ground.to_ground(np.array(at_px))
-        return [_point(point) if valid else None for point, valid in zip(points_m, on_ground, strict=True)]
+        return [place_of(point) if valid else None for point, valid in zip(points_m, on_ground, strict=True)]
 
 
 def laid_over(base: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
@@ -307,111 +299,3 @@ def _placed(seen: Seen, ground: AnyGround) -> tuple[Tracks, GroundPositions]:
         foot_covariance_px2=found.foot_covariance_px2,
     )
     return tracks, build_stage("locate", seen.settings).update(seen.frame.time_s, tracks, ground)
-
-
-def _window(ground: GroundMap) -> GroundWindow | None:
-    points_m = seen_ground_m(ground)
-    return window_around(points_m, (_PLAN_PX, _PLAN_PX), camera_up(ground)) if len(points_m) else None
-
-
-def _plan(window: GroundWindow | None) -> Plan | None:
-    if window is None:
-        return None
-    width, height = window.size_px
-    return Plan(width_px=width, height_px=height, m_per_px=window.m_per_px, to_plan=window.ground_to_window.tolist())
-
-
-def _camera_height(ground: GroundMap, unit: LengthUnit) -> str:
-    if ground.camera is None:
-        return ""
-    try:
-        return unit.length(float(view_from_homography(ground.image_to_ground, ground.camera).position_m[2]))
-    except GroundError:
-        return ""
-
-
-def _solid_px(seen: Seen, ground: GroundMap, top_px: FloatArray) -> list[list[Point]]:
-    """Return the outline of the reference's top as seen, of its foot as the map has it, and the edges between."""
-    reference = seen.settings.ground.reference
-    if reference is None or len(top_px) < 3:
-        return []
-    foot_px = np.array(_ring_px(ground, reference.shape().corners_m, steps=1))
-    lines = [_pixels(np.concatenate([top_px, top_px[:1]]))]
-    if len(foot_px) == len(top_px) + 1 and (reference.height_m or 0.0) > 0.0:
-        lines.append(_pixels(foot_px))
-        lines += [_pixels(np.array(edge)) for edge in zip(top_px, foot_px[:-1], strict=True)]
-    return lines
-
-
-def _off_px(draft: Draft, top_px: FloatArray, time_s: float) -> float | None:
-    clicked = np.array(draft.reference.corners_px)
-    if draft.ground != "reference" or len(top_px) != len(clicked) or abs(draft.reference.time_s - time_s) > _SAME_S:
-        return None
-    away = np.linalg.norm(clicked[:, None] - top_px[None], axis=2)
-    return float(away.min(axis=1).max())
-
-
-def _contours(ground: GroundMap, size_px: tuple[int, int], unit: LengthUnit) -> list[Contour]:
-    """Return the lines in the picture along which a place is equally sure, worse beyond them."""
-    columns = np.linspace(0.0, size_px[0] - 1.0, _CONTOUR_CELLS)
-    rows = np.linspace(0.0, size_px[1] - 1.0, _CONTOUR_CELLS * size_px[1] // size_px[0])
-    at_px = np.stack(np.meshgrid(columns, rows), axis=2).reshape(-1, 2)
-    _, on_ground = ground.to_ground(at_px)
-    by_map = map_jacobian(ground, ground.undistorted(at_px))
-    covariance = by_map @ ground.covariance @ by_map.transpose(0, 2, 1)
-    half = (covariance[:, 0, 0] + covariance[:, 1, 1]) / 2.0
-    apart = np.hypot((covariance[:, 0, 0] - covariance[:, 1, 1]) / 2.0, covariance[:, 0, 1])
-    sigma_m = np.sqrt(half + apart)
-    # Beyond the horizon nothing is sure; a number so large that every line ends before it.
-    sigma_m = np.where(on_ground & np.isfinite(sigma_m), sigma_m, 1e3).reshape(len(rows), len(columns))
-    lines = contourpy.contour_generator(columns, rows, np.log(sigma_m))
-    found = ((level, lines.lines(float(np.log(level)))) for level in _LEVELS_M)
-    return [
-        Contour(sigma_m=level, text=unit.limit(level), lines_px=[_pixels(np.array(line)) for line in parts])
-        for level, parts in found
-        if len(parts)
-    ]
-
-
-def _watched(watched: WatchedGround) -> Watched | None:
-    if not watched.judged:
-        return None
-    rows, columns = watched.cells.shape
-    return Watched(rows=rows, columns=columns, cells=watched.cells.tolist(), reasons=list(REASONS), share=watched.share)
-
-
-def _entities(tracks: Tracks, positions: GroundPositions, ground: AnyGround) -> list[Entity]:
-    entities = []
-    for row in range(len(tracks)):
-        is_placed = bool(positions.valid[row])
-        circle: list[Point] = []
-        if is_placed and isinstance(ground, GroundMap):
-            circle = _ring_px(ground, positions.xy_m[row] + positions.radius_m[row] * _CIRCLE[:-1], steps=1)
-        left, top, right, bottom = tracks.xyxy_px[row].tolist()
-        entities.append(
-            Entity(
-                kind=CLASSES[tracks.class_id[row]].name,
-                score=float(tracks.score[row]),
-                box_px=(left, top, right, bottom),
-                at_m=_point(positions.xy_m[row]) if is_placed else None,
-                circle_px=circle,
-            )
-        )
-    return entities
-
-
-def _ring_px(ground: GroundMap, ring_m: FloatArray, steps: int = _EDGE_STEPS) -> list[Point]:
-    """Return a closed ring on the ground as it is in the picture; its sides bend where the lens does."""
-    after = np.roll(ring_m, -1, axis=0)
-    shares = np.arange(steps) / steps
-    points_m = (ring_m[:, None] + shares[None, :, None] * (after - ring_m)[:, None]).reshape(-1, 2)
-    points_px, seen = ground.to_image(np.concatenate([points_m, points_m[:1]]))
-    return _pixels(points_px[seen])
-
-
-def _pixels(points_px: FloatArray) -> list[Point]:
-    return [(round(x, 2), round(y, 2)) for x, y in points_px.tolist()]
-
-
-def _point(point: FloatArray) -> tuple[float, float]:
-    return float(point[0]), float(point[1])
