@@ -93,7 +93,7 @@ def test_a_question_that_is_none_is_refused(client: TestClient, question: dict[s
 
 @pytest.mark.live
 def test_a_trial_runs_as_a_run_would_and_shows_its_film(client: TestClient, draft: dict[str, Any]) -> None:
-    begun = client.post("/api/trial", json={"time_s": 1.0, "lasts_s": 0.5, "draft": draft}).json()
+    begun = client.post("/api/trial", json={"time_s": 0.3, "lasts_s": 0.2, "draft": draft}).json()
     assert begun["state"] == "running"
     given_up_s = time.monotonic() + 240
     while (answer := client.get("/api/trial").json())["state"] == "running" and time.monotonic() < given_up_s:

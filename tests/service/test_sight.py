@@ -133,6 +133,26 @@ def test_the_plan_is_the_ground_from_above(sight: Sight, view: View, corners_px:
     np.testing.assert_allclose(scale, 1.0 / about.m_per_px, rtol=1e-6)
 
 
+@pytest.mark.parametrize(("time_s", "clicked_s", "begins_s"), [(0.0, 0.0, 0.0), (5.0, 2.0, 2.0), (5.0, 6.0, 5.0)])
+def test_a_trial_has_the_picture_that_was_clicked_in(
+    sight: Sight, corners_px: FloatArray, time_s: float, clicked_s: float, begins_s: float
+) -> None:
+    settings = sight.part_to_try(clicked(corners_px, 11, time_s=clicked_s), time_s, 3.0)
+    assert (settings.source.start_s, settings.source.stop_s) == (begins_s, time_s + 3.0)
+    assert settings.ground.reference is not None and settings.ground.reference.box_time_s == clicked_s
+
+
+@pytest.mark.parametrize("clicked_s", [0.0, 60.0])
+def test_a_trial_far_from_that_picture_looks_for_the_reference_by_itself(
+    sight: Sight, corners_px: FloatArray, clicked_s: float
+) -> None:
+    settings = sight.part_to_try(clicked(corners_px, 12, time_s=clicked_s), 20.0, 3.0)
+    reference = settings.ground.reference
+    assert reference is not None and reference.square_m == SIDE_M
+    assert reference.box_px is reference.box_time_s is reference.first_corner_px is None
+    assert (settings.source.start_s, settings.source.stop_s) == (20.0, 23.0)
+
+
 def test_a_run_with_the_saved_site_measures_what_the_page_showed(
     sight: Sight, corners_px: FloatArray, site_file: Path
 ) -> None:

@@ -132,7 +132,7 @@ class SetupPage:
 
     def begin_trial(self, question: TrialQuestion) -> TrialAnswer:
         """Run some seconds."""
-        return self._trial.begin(self._sight.settings(question.draft), question.time_s, question.lasts_s)
+        return self._trial.begin(self._sight.part_to_try(question.draft, question.time_s, question.lasts_s))
 
     def stop_trial(self) -> TrialAnswer:
         """Let the trial be."""

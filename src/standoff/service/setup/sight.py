@@ -6,7 +6,7 @@ import json
 import threading
 from collections import OrderedDict
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
@@ -56,6 +56,8 @@ _SURE_SCORE: Final = 0.3
 _PLAN_QUALITY: Final = 85
 _CLICK_SIGMA_PX: Final = 1.0
 """How well a hand with a magnifier puts a point of the tape."""
+_NEAR_S: Final = 10.0
+"""A trial begins so much earlier, at most, to have the picture that was clicked in."""
 _ANYWHERE_PX: Final = [(0.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, 0.0)]
 
 
@@ -118,6 +120,27 @@ class Sight:
         if draft.zones:
             write_zones(zones, draft.zones_of_site())
         return settings_from({}, "the draft", laid_over(self._base, own))
+
+    def part_to_try(self, draft: Draft, time_s: float, lasts_s: float) -> Settings:
+        """Return settings for some seconds of the film.
+
+        A run knows the reference from the picture that was clicked in. Where that is among these seconds, or not long
+        before, they begin with it; far from it the reference is looked for by itself.
+
+        Raises:
+            StandoffError: The draft contradicts itself, or is not complete.
+        """
+        settings = self.settings(draft)
+        told_s = draft.reference.time_s if draft.ground == "reference" else time_s
+        is_near = time_s - _NEAR_S <= told_s < time_s + lasts_s
+        reference = settings.ground.reference
+        if reference is not None and not is_near:
+            unclicked = {"box_px": None, "box_time_s": None, "first_corner_px": None}
+            ground = settings.ground.model_copy(update={"reference": reference.model_copy(update=unclicked)})
+            settings = settings.model_copy(update={"ground": ground})
+        begins_s = min(time_s, told_s) if is_near else time_s
+        part = replace(settings.source, start_s=begins_s, stop_s=time_s + lasts_s)
+        return settings.model_copy(update={"source": part})
 
     def see(self, time_s: float, draft: Draft) -> Seen:
         """Look at a picture with a draft; the last few looks are remembered.

@@ -5,7 +5,6 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from contextlib import closing
-from dataclasses import replace
 from math import isfinite
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -43,16 +42,13 @@ class Trial:
         """How the last one goes."""
         return self._answer
 
-    def begin(self, settings: Settings, time_s: float, lasts_s: float) -> TrialAnswer:
+    def begin(self, settings: Settings) -> TrialAnswer:
         """Begin one.
 
         Args:
-            settings: What the draft says.
-            time_s: From when on.
-            lasts_s: How long.
+            settings: What the draft says, for a part of the film.
         """
-        part = replace(settings.source, start_s=time_s, stop_s=time_s + lasts_s)
-        settings = settings.model_copy(update={"source": part, "outputs": _OUTPUTS})
+        settings = settings.model_copy(update={"outputs": _OUTPUTS})
         with self._lock:
             self._number += 1
             self._answer = TrialAnswer(state="running", number=self._number)
