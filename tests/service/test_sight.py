@@ -149,7 +149,7 @@ def test_a_trial_far_from_that_picture_looks_for_the_reference_by_itself(
     settings = sight.part_to_try(clicked(corners_px, 12, time_s=clicked_s), 20.0, 3.0)
     reference = settings.ground.reference
     assert reference is not None and reference.square_m == SIDE_M
-    assert reference.box_px is reference.box_time_s is reference.first_corner_px is None
+    assert (reference.box_px, reference.box_time_s, reference.first_corner_px) == (None, None, None)
     assert (settings.source.start_s, settings.source.stop_s) == (20.0, 23.0)
 
 
