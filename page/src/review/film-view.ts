@@ -2,6 +2,7 @@
 
 import { css, html, nothing, svg, type SVGTemplateResult } from "lit";
 import { customElement, query, state } from "lit/decorators.js";
+import { lettersOver } from "../shared/look";
 import type { Word } from "../shared/words";
 import type { FrameAt } from "./questions";
 import { clock, ReviewPart, TONES } from "./review-part";
@@ -16,6 +17,7 @@ const LETTER_SHARE = 0.55;
 export class FilmView extends ReviewPart {
   static override styles = [
     ...ReviewPart.styles,
+    lettersOver,
     css`
       .frame {
         position: relative;
@@ -33,13 +35,6 @@ export class FilmView extends ReviewPart {
         inset: 0;
         width: 100%;
         height: 100%;
-      }
-      text {
-        paint-order: stroke;
-        stroke: #000;
-        stroke-linejoin: round;
-        fill: #fff;
-        font-family: system-ui, sans-serif;
       }
       .bar {
         display: flex;

@@ -2,6 +2,7 @@
 
 import { css, html, nothing, svg, type SVGTemplateResult } from "lit";
 import { customElement, query, state } from "lit/decorators.js";
+import { lettersOver } from "../shared/look";
 import { SetupPart } from "./setup-part";
 import { PictureMarks } from "./picture-marks";
 import { ask, type Pixel } from "./questions";
@@ -25,6 +26,7 @@ type Grip = { kind: "corner" | "point"; index: number };
 export class PictureView extends SetupPart {
   static override styles = [
     ...SetupPart.styles,
+    lettersOver,
     css`
       .bar {
         display: flex;
@@ -75,11 +77,6 @@ export class PictureView extends SetupPart {
         stroke: #ffd23f;
       }
       text {
-        paint-order: stroke;
-        stroke: #000;
-        stroke-linejoin: round;
-        fill: #fff;
-        font-family: system-ui, sans-serif;
         pointer-events: none;
       }
     `,

@@ -2,6 +2,17 @@
 
 import { css } from "lit";
 
+/** Letters that stay readable over a picture. */
+export const lettersOver = css`
+  text {
+    paint-order: stroke;
+    stroke: #000;
+    stroke-linejoin: round;
+    fill: #fff;
+    font-family: system-ui, sans-serif;
+  }
+`;
+
 export const controls = css`
   :host {
     display: block;

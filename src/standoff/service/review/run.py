@@ -14,7 +14,7 @@ from standoff.clips.ground_maps import MAP_COLUMNS, map_of
 from standoff.clips.run_folder import RunFolder, RunTable
 from standoff.core.errors import ConfigError, DataError
 from standoff.core.hazard_life import HazardLife
-from standoff.core.hazards import GRAVENESS, Severity
+from standoff.core.hazards import Severity, worse
 from standoff.core.homography import FloatArray
 from standoff.core.lengths import UNITS
 from standoff.core.outputs import OUTPUTS, ZONES_FILE
@@ -161,9 +161,9 @@ class FinishedRun:
             severity = life.severity_at(asked_s)
             if severity is None:
                 continue
-            worst_of_pair[life.track_ids] = _graver(worst_of_pair.get(life.track_ids), severity)
+            worst_of_pair[life.track_ids] = worse(worst_of_pair.get(life.track_ids, "unknown"), severity)
             for track_id in life.track_ids:
-                worst[track_id] = _graver(worst.get(track_id), severity)
+                worst[track_id] = worse(worst.get(track_id, "unknown"), severity)
         places = {row["track_id"]: (row["x_m"], row["y_m"]) for row in tracks if row["valid"]}
         share = frame["watched_share"]
         return FrameAt(
@@ -225,10 +225,6 @@ def _is_moved(before: Sequence[dict[str, Any]], now: Sequence[dict[str, Any]]) -
     known = {row["track_id"] for row in before if not math.isnan(row["vx_mps"])}
     still = [row for row in now if row["track_id"] in known and row["valid"]]
     return bool(still) and all(math.isnan(row["vx_mps"]) for row in still)
-
-
-def _graver(before: Severity | None, now: Severity) -> Severity:
-    return now if before is None else max(before, now, key=GRAVENESS.index)
 
 
 def _track(row: dict[str, Any], ground: AnyGround, severity: Severity | None) -> TrackAt:

@@ -155,7 +155,7 @@ class Sight:
                 self._seen.move_to_end(key)
                 return self._seen[key]
             settings = self.settings(draft)
-            detections = self.film.found(frame) if self._detects else Detections.empty()
+            detections = self._found(frame)
             stage = build_ground(settings, self.film.camera_prior)
             stage.prepare(self.film.size_px)
             ground = self._map(stage, frame, detections, draft)
@@ -179,7 +179,10 @@ class Sight:
         assert settings.ground.reference is not None
         shape, height_m = settings.ground.reference.shape(), reference.height_m or 0.0
         ground = clicked_map(corners_px, shape.corners_m, height_m, self.film.camera_prior)
-        return Seen(frame, settings, ground, self.film.found(frame) if self._detects else Detections.empty(), {})
+        return Seen(frame, settings, ground, self._found(frame), {})
+
+    def _found(self, frame: Frame) -> Detections:
+        return self.film.found(frame) if self._detects else Detections.empty()
 
     def _map(self, stage: Ground, frame: Frame, detections: Detections, draft: Draft) -> GroundMap | NoGroundMap:
         """Map the picture that was clicked in, then carry on to another one if that is asked for."""
@@ -187,7 +190,7 @@ class Sight:
         told = self.film.frame(told_s)
         if told.time_s == frame.time_s:
             return stage.update(frame, detections, _ALONE)
-        stage.update(told, self.film.found(told) if self._detects else Detections.empty(), _ALONE)
+        stage.update(told, self._found(told), _ALONE)
         # Not clicked in this one: only what is found again counts.
         return stage.update(frame, detections, _ALONE)
 
