@@ -219,6 +219,7 @@ def test_points_zones_and_circles_are_set_and_a_trial_runs(short_film: Path, vie
         page.click("radii-panel summary")
         page.fill("input[name=excavator]", "10")
         page.keyboard.press("Enter")
+        page.wait_for_function("() => " + SHOWN_RADIUS.format(text="10 m"))
         page.select_option("select[name=unit]", "feet")
         page.wait_for_function("() => " + SHOWN_RADIUS.format(text="32.81 ft"))
         page.wait_for_selector("result-panel .good")

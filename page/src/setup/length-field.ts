@@ -24,7 +24,11 @@ export class LengthField extends SetupPart {
     this.shownM = this.lengthM;
     this.shownUnit = unit;
     if (this.lengthM === null) this.text = "";
-    else void ask.lengthText(unit, this.lengthM).then((answer) => (this.text = answer.text));
+    else
+      void ask.lengthText(unit, this.lengthM).then((answer) => {
+        // Unless another unit was chosen meanwhile.
+        if (this.shownUnit === unit) this.text = answer.text;
+      });
   }
 
   private async take(text: string): Promise<void> {
@@ -32,8 +36,10 @@ export class LengthField extends SetupPart {
     this.text = text;
     if (!text.trim()) return this.give(null);
     try {
-      const answer = await ask.length(this.site.draft!.unit, text);
+      const unit = this.site.draft!.unit;
+      const answer = await ask.length(unit, text);
       this.text = answer.text;
+      this.shownUnit = unit;
       this.give(answer.length_m);
     } catch (error) {
       this.wrong = error instanceof Error ? error.message : String(error);
