@@ -9,6 +9,6 @@ export default defineConfig({
     assetsInlineLimit: 0,
     modulePreload: { polyfill: false },
     target: "es2022",
-    rollupOptions: { input: ["setup.html", "review.html"] },
+    rollupOptions: { input: ["setup.html", "review.html", "status.html"] },
   },
 });

@@ -2,16 +2,13 @@
 
 import { css, html, nothing, svg, type SVGTemplateResult } from "lit";
 import { customElement, query, state } from "lit/decorators.js";
-import { lettersOver } from "../shared/look";
+import { labelsOver, type Pixel } from "../shared/labels";
+import { lettersOver, TONES } from "../shared/look";
 import type { Word } from "../shared/words";
 import type { FrameAt } from "./questions";
-import { clock, ReviewPart, TONES } from "./review-part";
+import { clock, ReviewPart } from "./review-part";
 
-type Pixel = [number, number];
 const SPEEDS = [0.25, 0.5, 1, 2, 4];
-const TEXT_SHARE = 0.015;
-const LEAST_TEXT_PX = 12;
-const LETTER_SHARE = 0.55;
 
 @customElement("film-view")
 export class FilmView extends ReviewPart {
@@ -203,10 +200,8 @@ export class FilmView extends ReviewPart {
   }
 
   private overlays(frame: FrameAt, widthPx: number): SVGTemplateResult {
-    // On a small screen letters stay readable, and fewer of them find room.
-    const size = Math.max(TEXT_SHARE * widthPx, (LEAST_TEXT_PX * widthPx) / (this.clientWidth || widthPx));
+    const labels = labelsOver(widthPx, this.clientWidth);
     const thin = widthPx / 900;
-    const labels = new Labels(size, widthPx);
     return svg`
       ${frame.tracks.map((one) => {
         const tone = TONES[one.severity ?? "none"];
@@ -233,28 +228,9 @@ export class FilmView extends ReviewPart {
       })}
       ${frame.tracks.map((one) => {
         const [left, top, right] = one.box_px as [number, number, number, number];
-        return labels.put([(left + right) / 2, top - size / 3], `${this.say(one.kind as Word)} ${one.track_id}`);
+        return labels.put([(left + right) / 2, top - labels.size / 3], `${this.say(one.kind as Word)} ${one.track_id}`);
       })}
     `;
-  }
-}
-
-/** Texts in the picture; one that would lie over another is left out, those put first stay. */
-class Labels {
-  private readonly taken: [number, number, number, number][] = [];
-
-  constructor(
-    private readonly size: number,
-    private readonly widthPx: number,
-  ) {}
-
-  put(at: Pixel, text: string): SVGTemplateResult | typeof nothing {
-    const half = (LETTER_SHARE * this.size * text.length) / 2;
-    const x = Math.min(Math.max(at[0], half), this.widthPx - half);
-    const box: [number, number, number, number] = [x - half, at[1] - this.size, x + half, at[1]];
-    if (this.taken.some(([left, top, right, bottom]) => box[0] < right && left < box[2] && box[1] < bottom && top < box[3])) return nothing;
-    this.taken.push(box);
-    return svg`<text x=${x} y=${at[1]} font-size=${this.size} stroke-width=${this.size / 4} text-anchor="middle">${text}</text>`;
   }
 }
 

@@ -2,9 +2,10 @@
 
 import { css, html, nothing } from "lit";
 import { customElement, state } from "lit/decorators.js";
+import { TONES } from "../shared/look";
 import type { Word } from "../shared/words";
 import type { HazardAnswer, Severity, Verdict } from "./questions";
-import { clock, ReviewPart, TONES } from "./review-part";
+import { clock, ReviewPart } from "./review-part";
 
 const SEVERITIES: Severity[] = ["danger", "warning", "unknown"];
 const VERDICTS: Verdict[] = ["open", "right", "false_alarm", "unsure"];

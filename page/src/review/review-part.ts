@@ -2,10 +2,8 @@
 
 import { Part } from "../shared/part";
 import type { Word } from "../shared/words";
-import type { HazardAnswer, Severity } from "./questions";
+import type { HazardAnswer } from "./questions";
 import { view, type RunView } from "./run-view";
-
-export const TONES: Record<Severity | "none", string> = { danger: "#f5484a", warning: "#ffb224", unknown: "#a3abb5", none: "#ffffff" };
 
 export class ReviewPart extends Part<RunView> {
   protected readonly view = view;

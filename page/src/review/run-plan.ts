@@ -2,8 +2,9 @@
 
 import { css, html, nothing, svg } from "lit";
 import { customElement } from "lit/decorators.js";
+import { TONES } from "../shared/look";
 import type { Word } from "../shared/words";
-import { ReviewPart, TONES } from "./review-part";
+import { ReviewPart } from "./review-part";
 
 const TRAIL_S = 3;
 const WIDTH = 600;

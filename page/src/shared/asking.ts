@@ -16,8 +16,9 @@ interface Problem {
   fix: string;
 }
 
-export async function answered(path: string, method: string, question?: unknown): Promise<Response> {
+export async function answered(path: string, method: string, question?: unknown, withinMs?: number): Promise<Response> {
   const request: RequestInit = { method };
+  if (withinMs !== undefined) request.signal = AbortSignal.timeout(withinMs);
   if (question !== undefined) {
     request.headers = { "Content-Type": "application/json" };
     request.body = JSON.stringify(question);
@@ -31,8 +32,8 @@ export async function answered(path: string, method: string, question?: unknown)
   return answer;
 }
 
-export async function asked<Answer>(path: string, method: string, question?: unknown): Promise<Answer> {
-  return (await (await answered(path, method, question)).json()) as Answer;
+export async function asked<Answer>(path: string, method: string, question?: unknown, withinMs?: number): Promise<Answer> {
+  return (await (await answered(path, method, question, withinMs)).json()) as Answer;
 }
 
 /** The picture at a time, and when it really is. */

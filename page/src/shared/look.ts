@@ -2,6 +2,9 @@
 
 import { css } from "lit";
 
+/** Of a severity, over a picture. */
+export const TONES = { danger: "#f5484a", warning: "#ffb224", unknown: "#a3abb5", none: "#ffffff" } as const;
+
 /** Letters that stay readable over a picture. */
 export const lettersOver = css`
   text {

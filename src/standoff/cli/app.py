@@ -22,6 +22,7 @@ from standoff.cli import (
     export,
     join,
     label,
+    live,
     marker,
     page,
     quantize,
@@ -59,6 +60,11 @@ app.command("doctor")(doctor.doctor)
 app.command("schema")(schema.schema)
 app.command("setup")(page.setup)
 app.command("open")(page.open_run)
+app.command("serve")(live.serve)
+app.command("reload")(live.reload)
+app.command("wearable")(live.wearable)
+app.command("latency")(live.latency)
+app.command("shelve")(live.shelve)
 
 
 def _join_verbs() -> None:

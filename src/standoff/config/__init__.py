@@ -14,6 +14,15 @@ from standoff.config.build import (
     import_factory,
     site_origin,
 )
+from standoff.config.live import (
+    AlertSettings,
+    BrokerSettings,
+    CaptureSettings,
+    LiveSettings,
+    NotifySettings,
+    ReceiverSettings,
+    ShiftSettings,
+)
 from standoff.config.load import (
     anchor_paths,
     load_settings,
@@ -25,6 +34,7 @@ from standoff.config.load import (
 )
 from standoff.config.markers import MarkerSettings
 from standoff.config.params import read_params
+from standoff.config.secret import Secret, read_secret
 from standoff.config.settings import (
     STAGE_NAMES,
     GroundSettings,
@@ -32,18 +42,27 @@ from standoff.config.settings import (
     Replacement,
     Settings,
 )
-from standoff.config.site import SiteSettings, StreamSettings, load_site
+from standoff.config.site import SiteSettings, StreamSettings, broker_settings, is_site, load_site
 
 __all__ = [
     "STAGE_NAMES",
+    "AlertSettings",
+    "BrokerSettings",
+    "CaptureSettings",
     "GroundSettings",
+    "LiveSettings",
     "MarkerSettings",
+    "NotifySettings",
+    "ReceiverSettings",
     "ReferenceSettings",
     "Replacement",
+    "Secret",
     "Settings",
+    "ShiftSettings",
     "SiteSettings",
     "StreamSettings",
     "anchor_paths",
+    "broker_settings",
     "build_ground",
     "build_marker_observer",
     "build_replacement",
@@ -51,10 +70,12 @@ __all__ = [
     "build_watcher",
     "build_zones",
     "import_factory",
+    "is_site",
     "load_settings",
     "load_site",
     "named_files",
     "read_params",
+    "read_secret",
     "read_settings_file",
     "recorded_settings",
     "resolved",

@@ -19,12 +19,16 @@ from standoff.core.errors import ConfigError
 from standoff.files.yaml_text import read_yaml
 from standoff.stages.detect import SHIPPED_MODELS, find_ground_points, find_model
 
+_SECRET_NAMES: Final = frozenset({"password", "secret", "apprise"})
+"""What stands there by mistake may be the secret itself."""
+
 
 def _clause(error: ErrorDetails) -> str:
     """Return one pydantic error as `where: what (found ...)`."""
     where = ".".join(str(part) for part in error["loc"])
     message = error["msg"].removeprefix("Value error, ")
-    found = "" if isinstance(error["input"], (dict, list)) else f" (found {error['input']!r})"
+    is_shown = not isinstance(error["input"], (dict, list)) and _SECRET_NAMES.isdisjoint(error["loc"])
+    found = f" (found {error['input']!r})" if is_shown else ""
     return f"{where}: {message}{found}" if where else message
 
 

@@ -81,15 +81,23 @@ class StreamClock:
         """Take that the next picture comes over a new connection, with stamps that begin anywhere."""
         self._shift_s = None
 
-    def at(self, stamp_s: float, told: datetime | None = None, told_by: ToldBy = "arrival") -> StreamTime:
+    def at(
+        self,
+        stamp_s: float,
+        told: datetime | None = None,
+        told_by: ToldBy = "arrival",
+        *,
+        arrived_s: float | None = None,
+    ) -> StreamTime:
         """Return when a picture was taken.
 
         Args:
             stamp_s: Its presentation timestamp.
             told: Aware UTC of its capture, where somebody tells; None: it counts as captured when it arrived.
             told_by: Who tells. What a sender tells has to be plausible by this machine's clock; a file's time need not.
+            arrived_s: When it arrived by this machine's monotonic clock; None: now.
         """
-        now_s = self._clock.monotonic_s()
+        now_s = self._clock.monotonic_s() if arrived_s is None else arrived_s
         passed_s = 0.0 if self._is_fresh else now_s - self._seen_s
         step_s = stamp_s - self._stamp_s
         leaps = self._shift_s is not None and not -_LEAST_STEP_S < step_s <= passed_s + _MOST_JUMP_S

@@ -91,6 +91,20 @@ class WatchedGround:
         return float(1.0 - self.found_share[self.watched].mean()) if self.watched.any() else float("nan")
 
 
+def cells_at(watched: WatchedGround, points_px: FloatArray, size_px: tuple[int, int]) -> CellArray:
+    """Return (N,) what is true of the ground under points: `WATCHED`, `NO_GROUND`, or the number of a reason.
+
+    Args:
+        watched: That somebody judged.
+        points_px: (N, 2) in the picture; outside of it, and where they are not finite, is no ground.
+        size_px: (width, height) of the picture.
+    """
+    cells, inside = cell_of(points_px, size_px)
+    if not watched.judged:
+        return np.full(len(points_px), NO_GROUND, dtype=np.int8)
+    return np.where(inside, watched.cells[cells[:, 0], cells[:, 1]], NO_GROUND).astype(np.int8)
+
+
 def cell_of(points_px: FloatArray, size_px: tuple[int, int]) -> tuple[npt.NDArray[np.int64], BoolArray]:
     """Return in which cell each point lies.
 

@@ -185,6 +185,15 @@ class Monitor:
         self._note(hazards)
         return Silence(stream_id if last is None else last.frame.stream_id, time_s, reason, hazards, self.open_hazards)
 
+    def resume(self) -> None:
+        """Take that the next picture comes after a gap: whoever is seen then is followed anew.
+
+        The map is kept: whether the picture still shows the same ground is found out from the picture.
+        """
+        for stage in (self.tracker, self.locator, self.proximity):
+            stage.reset()
+        self._is_near = False
+
     def close(self, time_s: float, *, lost: str = "") -> tuple[Hazard, ...]:
         """End the stream and return what is said last: of what is open, that it closes, or that it is unknown.
 

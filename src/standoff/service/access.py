@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import secrets
+from collections.abc import Collection
 from http.cookies import CookieError, SimpleCookie
 from typing import Final
 from urllib.parse import parse_qs
@@ -35,13 +37,16 @@ class Access:
 
     Args:
         app: What is guarded.
-        token: The secret of the address; kept nowhere else.
+        token: The secret of the address.
+        opens_once: False: as often as somebody has it, and cookies outlive a restart that keeps it.
+        open_paths: What anybody on this machine may ask.
     """
 
-    def __init__(self, app: ASGIApp, token: str) -> None:
+    def __init__(self, app: ASGIApp, token: str, *, opens_once: bool = True, open_paths: Collection[str] = ()) -> None:
         self._app = app
         self._token: str | None = token
-        self._session = secrets.token_urlsafe(32)
+        self._opens_once, self._open_paths = opens_once, frozenset(open_paths)
+        self._session = secrets.token_urlsafe(32) if opens_once else hashlib.sha256(token.encode()).hexdigest()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer, or refuse."""
@@ -49,7 +54,7 @@ class Access:
             await self._app(scope, receive, send)
             return
         answer = self._refusal(scope) or self._opening(scope)
-        if answer is None and not self._is_known(scope):
+        if answer is None and scope["path"] not in self._open_paths and not self._is_known(scope):
             answer = PlainTextResponse("Open the address that `standoff` printed: it opens once.", status_code=403)
         guarded = _with_headers(send)
         await (self._app if answer is None else answer)(scope, receive, guarded)
@@ -71,7 +76,8 @@ class Access:
             return None
         if not secrets.compare_digest(given.encode(), self._token.encode()):
             return None
-        self._token = None
+        if self._opens_once:
+            self._token = None
         answer = RedirectResponse("/", status_code=303)
         answer.set_cookie(COOKIE, self._session, httponly=True, samesite="strict", path="/")
         return answer

@@ -43,14 +43,24 @@ def answering(title: str, pages: OpenPages) -> FastAPI:
         title: Of its contract.
         pages: Which it counts.
     """
-    app = FastAPI(title=title, version=__version__, docs_url=None, redoc_url=None, openapi_url="/api/openapi.json")
-    app.add_exception_handler(StandoffError, _problem)
+    app = answering_only(title)
 
     async def events() -> StreamingResponse:
         """Tell the page when something has changed; while it listens, it is open."""
         return StreamingResponse(pages.events(), media_type="text/event-stream")
 
     app.get("/api/events", response_class=StreamingResponse)(events)
+    return app
+
+
+def answering_only(title: str) -> FastAPI:
+    """Return an application that answers nothing yet.
+
+    Args:
+        title: Of its contract.
+    """
+    app = FastAPI(title=title, version=__version__, docs_url=None, redoc_url=None, openapi_url="/api/openapi.json")
+    app.add_exception_handler(StandoffError, _problem)
     return app
 
 

@@ -15,7 +15,7 @@ from starlette.types import ASGIApp
 from standoff.core.errors import ConfigError
 from standoff.service.access import Access
 
-_HOST: Final = "127.0.0.1"
+HOST: Final = "127.0.0.1"
 _LEFT_S: Final = 5.0
 """A page that is loaded again is away for less than this."""
 _BEAT_S: Final = 1.0
@@ -76,9 +76,9 @@ def serve_page(
     Raises:
         ConfigError: The port is taken.
     """
-    listening = _listen(port)
+    listening = listen(port)
     token = secrets.token_urlsafe(24)
-    address = f"http://{_HOST}:{listening.getsockname()[1]}/?token={token}"
+    address = f"http://{HOST}:{listening.getsockname()[1]}/?token={token}"
     config = uvicorn.Config(
         Access(app, token), log_level="error", access_log=False, lifespan="off", timeout_graceful_shutdown=2
     )
@@ -105,13 +105,13 @@ def serve_page(
         listening.close()
 
 
-def _listen(port: int) -> socket.socket:
+def listen(port: int) -> socket.socket:
     """Return a socket that listens on this machine alone."""
     listening = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     # A port that a page just left can be used again; one on which somebody listens cannot.
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
-        listening.bind((_HOST, port))
+        listening.bind((HOST, port))
         listening.listen()
     except OSError as error:
         listening.close()
