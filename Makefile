@@ -1,10 +1,11 @@
 # make demo   the whole monitor on a film that comes with it; installs the runtime only
 # make test   lint, types, layer contracts and tests: the same examples on every machine
 # make test-live   the tests that need servers or take long, which make test leaves out
+# make soak   what takes hours: a live site under load, 200 kills, hundreds of reconnects, four streams for HOURS=2
 # make test-processors   the numeric tests as older processors would compute; TESTS=... for others
 # make licences   of all that a runtime install brings, against an allow list; writes dist/standoff.cdx.json (CycloneDX)
 # make bundle   a folder in dist/ that installs without a network: wheels for this platform, detector, docs; EXTRAS=scale for more
-# make page   the pages of `standoff setup` and `standoff open`, built with Node; before `pip install .`, or in place for an editable one
+# make page   the pages of `standoff setup`, `open` and `serve`, built with Node; before `pip install .`, or in place for an editable one
 # make docs   the documentation as a site in site/; a dead link fails
 # make coverage   how much of the packages that run on site their own tests reach
 # make fuzz   the laws with many more examples, and others each time; prints how to repeat a failure
@@ -28,7 +29,7 @@ COUNTED := tests/core tests/files tests/stages tests/monitor src/standoff/core s
 DEMO_VENV := .venv-demo
 SOURCES := $(shell find src -type f -not -path '*/__pycache__/*')
 
-.PHONY: help setup test test-live test-processors coverage fuzz lint types contracts licences bundle unit compiled demo demo-clean demo-pets docs page bench lock clean
+.PHONY: help setup test test-live soak test-processors coverage fuzz lint types contracts licences bundle unit compiled demo demo-clean demo-pets docs page bench lock clean
 
 help:
 	@sed -n 's/^# make/make/p' Makefile
@@ -71,6 +72,11 @@ compiled: $(READY)
 test-live: $(READY)
 	@code=0; OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest $(ALL_TESTS) -n $(WORKERS) --dist worksteal -m live || code=$$?; \
 	if [ $$code = 5 ]; then echo "No test is marked live."; else exit $$code; fi
+
+# One after another: they measure.
+soak: $(READY)
+	STANDOFF_KILLS=200 STANDOFF_SOAK_HOURS=$(or $(HOURS),2) $(BIN)/python -m pytest tests/service/live -s -m "soak or live" \
+	  -k "soak or killed" -p no:xdist
 
 test-processors: $(READY)
 	$(BIN)/python tests/other_processors.py $(TESTS)

@@ -11,7 +11,7 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 BUILT = "src/standoff/service/page"
 LONGEST_S = 300
-LEFT_OUT = "the pages of `standoff setup` and `standoff open` are left out"
+LEFT_OUT = "the pages of `standoff setup`, `open` and `serve` are left out"
 
 
 class PagesHook(BuildHookInterface[Any]):

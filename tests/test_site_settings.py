@@ -31,7 +31,7 @@ def site(folder: Path, text: str) -> SiteSettings:
 def test_each_stream_has_the_defaults_but_for_what_it_says_itself(tmp_path: Path) -> None:
     loaded = site(tmp_path, SITE)
     gate, crane = loaded.streams["gate"], loaded.streams["crane-2"]
-    assert (gate.address, crane.address) == ("rtsp://10.0.0.5/live", "replay://film.mp4")
+    assert (gate.address, crane.address) == ("rtsp://10.0.0.5/live", f"replay://{tmp_path / 'film.mp4'}")
     assert gate.settings.model_dump() == loaded.defaults.model_dump()
     assert (crane.settings.hazard.buffer_m, crane.settings.hazard.release_s) == (2.0, 0.2)
     assert (gate.settings.detect_every, crane.settings.detect_every) == (1, 3)

@@ -95,7 +95,7 @@ def workshop(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     site = yaml.safe_load((FILM / "reference.yaml").read_text())
     site |= {"detections": str(DETECTIONS), "source": {"stop_s": 0.3, "every": 2}, "outputs": ["tracks", "hazards"]}
     (tmp_path / "site.yaml").write_text(yaml.safe_dump(site))
-    cameras = {"defaults": site, "streams": {name: {"address": "site.mp4"} for name in ("gate", "crane-2")}}
+    cameras = {"defaults": site, "streams": {name: {"address": "replay://site.mp4"} for name in ("gate", "crane-2")}}
     (tmp_path / "cameras.yaml").write_text(yaml.safe_dump(cameras))
     (tmp_path / "survey.yaml").write_text(yaml.safe_dump(true_survey()))
     shutil.copytree(GOLDEN, tmp_path / "out")

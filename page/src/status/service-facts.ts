@@ -1,30 +1,40 @@
 /** The service itself, for whoever looks after it. */
 
-import { html, nothing } from "lit";
+import { css, html, nothing } from "lit";
 import { customElement } from "lit/decorators.js";
 import type { Word } from "../shared/words";
 import { MARKS, StatusPart } from "./status-part";
 
 @customElement("service-facts")
 export class ServiceFacts extends StatusPart {
+  static override styles = [
+    ...StatusPart.styles,
+    css`
+      h3 {
+        font-size: 0.95rem;
+        margin: 0.8rem 0 0;
+      }
+    `,
+  ];
+
   override render() {
     const { status, isCurrent } = this.view;
     if (!status) return nothing;
-    const letters = Object.entries(status.letters).map(([name, count]) => `${this.number(count, 0)} ${this.say(`letter_${name}` as Word)}`);
     return html`<details>
       <summary><h2>${this.say("service")}</h2></summary>
       ${isCurrent ? nothing : html`<p class="wrong">${this.say("noAnswerSaid")}</p>`}
       <dl>
         <dt>${this.say("broker")}</dt>
         <dd>${status.broker}: ${this.whether(status.broker_connected, "connected", "connectedNot")}</dd>
-        <dt>${this.say("letters")}</dt>
-        <dd>${letters.join(", ") || "–"}</dd>
         <dt>${this.say("toWrist")}</dt>
         <dd>${this.quantiles(status.to_wrist_ms)}</dd>
         <dt>${this.say("sentToShown")}</dt>
         <dd>${this.quantiles(status.sent_to_shown_ms)}</dd>
-        ${status.streams.map((one) => html`<dt>${this.say("detecting")}, ${one.name}</dt><dd>${this.quantiles(one.detect_ms)}</dd>`)}
       </dl>
+      <h3>${this.say("detecting")}</h3>
+      <dl>${status.streams.map((one) => html`<dt>${one.name}</dt><dd>${this.quantiles(one.detect_ms)}</dd>`)}</dl>
+      <h3>${this.say("letters")}</h3>
+      <dl>${Object.entries(status.letters).map(([name, count]) => html`<dt>${this.say(`letter_${name}` as Word)}</dt><dd>${this.number(count, 0)}</dd>`)}</dl>
       <h3>${this.say("processes")}</h3>
       <dl>
         ${status.processes.map(

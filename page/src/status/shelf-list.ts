@@ -1,12 +1,22 @@
 /** Alarms that somebody has set aside: of these, nobody is told. */
 
-import { html } from "lit";
+import { css, html } from "lit";
 import { customElement } from "lit/decorators.js";
 import type { ShelfAnswer } from "./questions";
 import { StatusPart } from "./status-part";
 
 @customElement("shelf-list")
 export class ShelfList extends StatusPart {
+  static override styles = [
+    ...StatusPart.styles,
+    css`
+      li {
+        margin: 0.4rem 0;
+        overflow-wrap: anywhere;
+      }
+    `,
+  ];
+
   override render() {
     const shelves = this.view.status?.shelves ?? [];
     return html`

@@ -42,7 +42,7 @@ export const statusLook = css`
   }
   dl {
     display: grid;
-    grid-template-columns: max-content minmax(0, 1fr);
+    grid-template-columns: fit-content(50%) minmax(0, 1fr);
     gap: 0.1rem 0.8rem;
     margin: 0.4rem 0;
   }
@@ -91,13 +91,13 @@ export class StatusPart extends Part<StatusView> {
   }
 
   protected percent(share: number): string {
-    return `${Math.floor(100 * share + 1e-6)} %`;
+    return `${Math.floor(100 * share + 1e-6)}\u00a0%`;
   }
 
   protected quantiles(found: Quantiles | null): string {
     if (!found) return this.say("notKnown");
     const { p50, p95, p99 } = found;
-    return `p50 ${this.number(p50, 0)} · p95 ${this.number(p95, 0)} · p99 ${this.number(p99, 0)} ms`;
+    return `p50 ${this.number(p50, 0)} · p95 ${this.number(p95, 0)} · p99 ${this.number(p99, 0)}\u00a0ms`;
   }
 
   /** Why a stream that is watched is still no full guard. */

@@ -127,7 +127,7 @@ export class StreamCard extends StatusPart {
       <dt>${this.say("groundWatched")}</dt>
       <dd class=${share === null ? "doubt" : ""}>
         ${share === null ? this.say("notKnown") : this.percent(share)}
-        ${lost.length ? html`<span class="quiet" lang="en">(${lost.map(([reason, part]) => `${reason} ${Math.round(100 * part)} %`).join(", ")})</span>` : nothing}
+        ${lost.length ? html`<span class="quiet" lang="en">(${lost.map(([reason, part]) => `${reason} ${Math.round(100 * part)}\u00a0%`).join(", ")})</span>` : nothing}
       </dd>
     `;
   }
@@ -135,10 +135,11 @@ export class StreamCard extends StatusPart {
   /** When the newest picture that was looked at was taken, and how that is known. */
   private taken(): string {
     const { delay, captured_age_ms } = this.stream;
-    const how = this.say(`delay_${delay}`);
-    if (delay === "unknown" && this.view.isWatched(this.stream)) return this.say("notKnown");
-    if (captured_age_ms === null || !this.view.isCurrent) return how;
-    return `${this.say("ago", { age: this.lasting(captured_age_ms) })}, ${how}`;
+    const { isCurrent } = this.view;
+    // Of a stream that is watched, its head says it already.
+    if (delay === "unknown" && isCurrent && !this.view.isWatched(this.stream)) return this.say("delay_unknown");
+    if (delay === "unknown" || captured_age_ms === null || !isCurrent) return this.say("notKnown");
+    return `${this.say("ago", { age: this.lasting(captured_age_ms) })}, ${this.say(`delay_${delay}`)}`;
   }
 
   private inSight(): string {

@@ -146,15 +146,17 @@ export class StreamPicture extends StatusPart {
       ${tracks.map((one) => {
         const [left, top, right, bottom] = one.xyxy_px as [number, number, number, number];
         const severity = SEVERITIES.find((grave) => hazards.some((hazard) => hazard.severity === grave && hazard.track_ids.includes(one.id)));
-        const [x, y, width, height] = [left, top, right - left, bottom - top];
+        // Around what is small, not over it.
+        const line = (severity ? 2 : 1) * thin;
+        const [x, y, width, height] = [left - line, top - line, right - left + 2 * line, bottom - top + 2 * line];
         return svg`
-          <rect x=${x} y=${y} width=${width} height=${height} fill="none" stroke="#000" stroke-opacity="0.6" stroke-width=${(severity ? 4 : 2.5) * thin}></rect>
-          <rect x=${x} y=${y} width=${width} height=${height} fill="none" stroke=${TONES[severity ?? "none"]} stroke-width=${(severity ? 2.5 : 1) * thin}></rect>
+          <rect x=${x} y=${y} width=${width} height=${height} fill="none" stroke="#000" stroke-opacity="0.6" stroke-width=${line + 1.5 * thin}></rect>
+          <rect x=${x} y=${y} width=${width} height=${height} fill="none" stroke=${TONES[severity ?? "none"]} stroke-width=${line}></rect>
         `;
       })}
       ${tracks.map((one) => {
         const [left, top, right] = one.xyxy_px as [number, number, number, number];
-        return labels.put([(left + right) / 2, Math.max(top - labels.size / 3, labels.size)], `${this.say(one.kind as Word)} ${one.id}`);
+        return labels.put([(left + right) / 2, Math.max(top - 5 * thin - labels.size / 4, labels.size)], `${this.say(one.kind as Word)} ${one.id}`);
       })}
     </svg>`;
   }

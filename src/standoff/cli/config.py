@@ -6,9 +6,14 @@ import textwrap
 from collections.abc import Iterable, Iterator
 from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Annotated, Any, get_args, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, get_args, get_type_hints
 
 import typer
+
+from standoff.core.errors import ConfigError
+
+if TYPE_CHECKING:
+    from standoff.config import Settings, SiteSettings
 
 app = typer.Typer(help="Show or check the settings.", no_args_is_help=True)
 _ConfigOption = Annotated[Path | None, typer.Option("--config", help="Settings, YAML. Absent: the defaults.")]
@@ -67,8 +72,11 @@ def show(
 ) -> None:
     """Print every setting with its value, meaning and bounds, as YAML that `run --config` reads."""
     from standoff.cli.console import write_json
-    from standoff.config import load_settings, resolved
+    from standoff.config import is_site, load_settings, load_site, read_settings_file, resolved
 
+    if config is not None and is_site(read_settings_file(config)):
+        _show_site(load_site(config), as_json=as_json)
+        return
     settings = load_settings(config)
     if as_json:
         write_json(resolved(settings), Path("-"))
@@ -76,16 +84,51 @@ def show(
     typer.echo("\n".join(_yaml_lines(settings)))
 
 
+def _show_site(site: SiteSettings, *, as_json: bool) -> None:
+    """Print the settings of a site; of secrets only where they come from."""
+    from standoff.cli.console import write_json
+    from standoff.config import resolved
+
+    if as_json:
+        streams = {
+            name: {"address": str(one.live_address), **one.capture.model_dump(mode="json"), **resolved(one.settings)}
+            for name, one in site.streams.items()
+        }
+        told = {**site.live.model_dump(mode="json"), "defaults": resolved(site.defaults), "streams": streams}
+        write_json(told, Path("-"))
+        return
+    lines = [*_yaml_lines(site.live), "defaults:", *_yaml_lines(site.defaults, "  "), "streams:"]
+    for name, one in site.streams.items():
+        lines += [f"  {name}:", f"    address: {one.live_address}", *_yaml_lines(one.capture, "    ")]
+    typer.echo("\n".join(lines))
+
+
 @app.command()
 def check(file: Annotated[Path, typer.Argument(help="Settings, YAML.", show_default=False)]) -> None:
-    """Check a settings file and everything that it points to: model, survey, camera, shapes."""
-    from standoff.config import STAGE_NAMES, build_stage, import_factory, load_settings
+    """Check a settings file, of a run or of a live site, and all that it points to: model, survey, camera, films."""
+    from standoff.config import is_site, load_settings, load_site, read_settings_file
+
+    if is_site(read_settings_file(file)):
+        site = load_site(file)
+        for name, stream in site.streams.items():
+            address = stream.live_address
+            if address.scheme == "replay" and not address.path.is_file():
+                raise ConfigError(
+                    expected=f"a film at streams.{name}.address", found=f"no {address.path}", fix="correct the path"
+                )
+            _check_stages(stream.settings)
+    else:
+        _check_stages(load_settings(file))
+    typer.echo(f"{file}: all settings are valid, and the files that they name can be used.")
+
+
+def _check_stages(settings: Settings) -> None:
+    """Make all stages and find all outputs; say what is doubtful."""
+    from standoff.config import STAGE_NAMES, build_stage, import_factory
     from standoff.monitor import warnings_of
 
-    settings = load_settings(file)
     for name in STAGE_NAMES:
         for warning in warnings_of(build_stage(name, settings)):
             typer.echo(f"standoff: warning: {warning}", err=True)
     for replacement in settings.extra_outputs.values():
         import_factory(replacement)
-    typer.echo(f"{file}: all settings are valid, and the files that they name can be used.")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import importlib.metadata
 import os
 import platform
@@ -12,6 +13,7 @@ import typer
 
 _EXTRAS = {
     "train": ("torch", "onnx"),
+    "serve": ("fastapi", "uvicorn", "paho-mqtt", "apprise", "prometheus-client", "structlog"),
     "sim": ("moderngl", "trimesh", "pycollada", "shapely", "mapbox-earcut"),
 }
 _IN_ITS_PLACE = {"onnxruntime": ("onnxruntime-gpu", "onnxruntime-openvino", "onnxruntime-directml")}
@@ -131,9 +133,24 @@ def _opengl() -> list[Finding]:
     return [Finding("simulator", "OpenGL through EGL", found, needed=False, fix=fix)]
 
 
+_TIME_ERROR = 5
+_ADJTIMEX_BYTES = 256
+
+
+def _clock() -> list[Finding]:
+    """Ask the kernel whether something keeps the clock right: ages of pictures rest on it."""
+    try:
+        code = ctypes.CDLL(None, use_errno=True).adjtimex(ctypes.create_string_buffer(_ADJTIMEX_BYTES))
+    except (OSError, AttributeError):
+        code = -1
+    found = "kept by NTP" if 0 <= code < _TIME_ERROR else ""
+    fix = "run chrony or systemd-timesyncd: a sender's time is compared with this clock"
+    return [Finding("live", "clock that is kept right", found, needed=False, fix=fix)]
+
+
 def examine() -> list[Finding]:
-    """Look at packages, inference providers, video encoders and OpenGL."""
-    return [*_packages(), *_opencv_clash(), *_providers(), *_encoders(), *_opengl()]
+    """Look at packages, inference providers, video encoders, OpenGL and the clock."""
+    return [*_packages(), *_opencv_clash(), *_providers(), *_encoders(), *_opengl(), *_clock()]
 
 
 def doctor(

@@ -31,12 +31,13 @@ def _served() -> Generator[None, None, None]:
 def serve(site: _Site) -> None:
     """Watch the streams of a site live and warn people; until Ctrl-C."""
     with _served():
+        from standoff.config import load_site
         from standoff.service.live.log import begin_log
         from standoff.service.live.supervisor import Supervisor
 
-        supervisor = Supervisor(site, lambda address: typer.echo(f"Status: {address}", err=True))
-        begin_log(supervisor.site.secrets)
-        supervisor.run()
+        loaded = load_site(site)
+        begin_log(loaded.secrets)
+        Supervisor(site, loaded, lambda address: typer.echo(f"Status: {address}", err=True)).run()
 
 
 def reload(site: _Site) -> None:

@@ -11,7 +11,7 @@ import typer
 def schema(
     name: Annotated[
         str | None,
-        typer.Argument(help="run, hazards, tracks, proximity, frames, detections or zones.", show_default=False),
+        typer.Argument(help="One of those that are printed without a name.", show_default=False),
     ] = None,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="Folder for all of them; created.", show_default=False)

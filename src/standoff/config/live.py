@@ -32,7 +32,11 @@ def _anchored(given: Path, info: ValidationInfo) -> Path:
 
 def _readable(given: Path, info: ValidationInfo) -> Path:
     path = _anchored(given, info)
-    if not path.is_file():
+    try:
+        is_there = path.is_file()
+    except OSError:  # A name that is too long.
+        is_there = False
+    if not is_there:
         raise ValueError(f"no such file: {given}")
     return path
 
@@ -77,6 +81,11 @@ class CaptureSettings(_Part):
     def _whose_password(self) -> CaptureSettings:
         if self.password is not None and not self.user:
             raise ValueError("a password needs a `user`")
+        if self.delay_bound_s is not None and self.delay_bound_s > self.watch.late_after_s:
+            raise ValueError(
+                f"delay_bound_s is above watch.late_after_s ({self.watch.late_after_s:g} s): the stream would be "
+                "late for ever; raise late_after_s if you answer for warnings that are so late"
+            )
         return self
 
 
@@ -229,7 +238,7 @@ class ShiftSettings(_Part):
     def _known(cls, given: str) -> str:
         try:
             ZoneInfo(given)
-        except (OSError, ValueError) as error:
+        except (OSError, ValueError, KeyError) as error:
             raise ValueError("no such time zone") from error
         return given
 

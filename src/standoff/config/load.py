@@ -27,9 +27,16 @@ def _clause(error: ErrorDetails) -> str:
     """Return one pydantic error as `where: what (found ...)`."""
     where = ".".join(str(part) for part in error["loc"])
     message = error["msg"].removeprefix("Value error, ")
-    is_shown = not isinstance(error["input"], (dict, list)) and _SECRET_NAMES.isdisjoint(error["loc"])
-    found = f" (found {error['input']!r})" if is_shown else ""
+    found = "" if _may_be_secret(error) else f" (found {error['input']!r})"
     return f"{where}: {message}{found}" if where else message
+
+
+def _may_be_secret(error: ErrorDetails) -> bool:
+    given = error["input"]
+    if isinstance(given, (dict, list)) or not _SECRET_NAMES.isdisjoint(error["loc"]):
+        return True
+    # A name that is mistyped may be a secret's, and an address may hold credentials.
+    return error["type"] == "extra_forbidden" or "://" in str(given)
 
 
 _ALIKE: Final = 0.85
@@ -83,7 +90,14 @@ def anchor_paths(settings: dict[str, Any], folder: Path) -> None:
         if not isinstance(section, dict) or not isinstance(section.get(name), str):
             continue
         if section[name] not in _NAMED.get(name, ()):
-            section[name] = str((folder / section[name]).resolve())
+            section[name] = _anchored(section[name], name, folder)
+
+
+def _anchored(given: str, name: str, folder: Path) -> str:
+    try:
+        return str((folder / given).resolve())
+    except ValueError:
+        raise ConfigError(expected=f"a path in `{name}`", found=repr(given), fix="correct it") from None
 
 
 def _check_environment() -> None:
@@ -168,6 +182,8 @@ def settings_from(from_file: Mapping[str, Any], origin: str, overrides: Mapping[
     _check_environment()
     from_caller = copy.deepcopy(dict(overrides or {}))
     anchor_paths(from_caller, Path.cwd())
+    # YAML has whole numbers as names, too: no setting has one.
+    named = {str(name): value for name, value in from_file.items()}
 
     class _FileSettings(Settings):
         @classmethod
@@ -179,7 +195,7 @@ def settings_from(from_file: Mapping[str, Any], origin: str, overrides: Mapping[
             dotenv_settings: PydanticBaseSettingsSource,
             file_secret_settings: PydanticBaseSettingsSource,
         ) -> tuple[PydanticBaseSettingsSource, ...]:
-            return init_settings, env_settings, InitSettingsSource(settings_cls, dict(from_file))
+            return init_settings, env_settings, InitSettingsSource(settings_cls, named)
 
     try:
         made = _FileSettings(**from_caller)

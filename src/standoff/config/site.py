@@ -132,7 +132,13 @@ def _stream(name: str, given: object, defaults: Mapping[str, Any], path: Path) -
 def _anchored(address: str, folder: Path) -> str:
     """Make the path of a film that is replayed absolute."""
     scheme, sign, rest = address.partition("://")
-    return f"{scheme}{sign}{(folder / rest).resolve()}" if scheme == "replay" else address
+    if scheme != "replay" or not rest:
+        return address
+    try:
+        return f"{scheme}{sign}{(folder / rest).resolve()}"
+    except ValueError:
+        # No path can be so: `LiveAddress` says that.
+        return address
 
 
 def _part(kind: type[Part], given: Mapping[str, Any], path: Path, where: str) -> Part:

@@ -29,8 +29,10 @@ class WatchLimits:
     stale_after_s: Annotated[float, Interval(gt=0, le=10), Doc("Stale without a picture for so many seconds.")] = 0.5
     lost_after_s: Annotated[float, Interval(gt=0, le=60), Doc("Lost without a picture for so many seconds.")] = 1.5
     frozen_after_s: Annotated[
-        float, Gt(0), Doc("Frozen when the same picture came again and again for so many seconds.")
-    ] = 3.0
+        float,
+        Gt(0),
+        Doc("Frozen when the same picture came again and again for so many seconds; .inf: never, for a quiet scene."),
+    ] = 5.0
     late_after_s: Annotated[
         float, Gt(0), Doc("Late when pictures are so many seconds old as they arrive, where that is known.")
     ] = 2.0

@@ -17,6 +17,7 @@ from standoff.messages.events import Alert, HazardNews, HealthNews, Heartbeat, S
 CONTENT_TYPE: Final = "application/cloudevents+json"
 _VERSION: Final = "1.0"
 _LARGEST_BYTES: Final = 65_536
+_LONGEST_REASON: Final = 300
 
 EVENT_TYPES: Final[Mapping[type, str]] = MappingProxyType(
     {
@@ -33,7 +34,15 @@ Told = TypeVar("Told")
 
 
 class Unreadable(ValueError):
-    """A message that cannot be read, and why, in one line."""
+    """A message that cannot be read, and why, in one short line.
+
+    Args:
+        reason: Why; what stands in the message may be part of it.
+    """
+
+    def __init__(self, reason: str) -> None:
+        line = "".join(sign if sign.isprintable() else " " for sign in reason)
+        super().__init__(" ".join(line.split())[:_LONGEST_REASON])
 
 
 def event_text(
@@ -125,13 +134,14 @@ def _no_number(name: str) -> float:
 
 
 @cache
-def _adapter(kind: Any) -> TypeAdapter[Any]:  # noqa: ANN401 - a class
+def _adapter(kind: type[Any]) -> TypeAdapter[Any]:
     return TypeAdapter(with_config(ConfigDict(extra="ignore", allow_inf_nan=False))(kind))
 
 
 def _checked(given: object, kind: type[Told]) -> Told:
     try:
-        checked: Told = _adapter(kind).validate_json(json.dumps(given), strict=True)
+        any_kind: Any = kind
+        checked: Told = _adapter(any_kind).validate_json(json.dumps(given), strict=True)
     except ValidationError as error:
         first = error.errors(include_url=False, include_input=False)[0]
         where = ".".join(str(part) for part in first["loc"]) or "the message"

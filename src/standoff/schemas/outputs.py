@@ -9,6 +9,7 @@ from typing import Any, Final
 from standoff.clips.reviews import REVIEW_FILE
 from standoff.core.outputs import OUTPUTS, RECORD_FILE, SCHEMA_VERSION, ZONES_FILE
 from standoff.schemas.events import event_schema, review_schema
+from standoff.schemas.messages import MESSAGE_SCHEMAS
 from standoff.schemas.record import record_schema
 from standoff.schemas.rows import row_schema
 from standoff.schemas.zones import zones_schema
@@ -25,6 +26,7 @@ _MAKERS: Final[Mapping[str, tuple[str, Callable[[], dict[str, Any]]]]] = Mapping
         "detections": (f"{OUTPUTS['detections']}, one row", lambda: row_schema(DETECTIONS.schema)),
         "zones": (ZONES_FILE, zones_schema),
         "review": (f"{REVIEW_FILE}, one line", review_schema),
+        **{name: (f"{name}, one message", make) for name, make in MESSAGE_SCHEMAS.items()},
     }
 )
 

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import threading
 import time
+import urllib.error
 import urllib.request
 from collections.abc import Generator
 from contextlib import contextmanager
@@ -19,12 +20,12 @@ import yaml
 from service.live.servers import until
 
 PROJECT = Path(__file__).resolve().parents[3]
-ENVIRONMENT = {
-    **os.environ,
+OURS = {
     "PYTHONPATH": os.pathsep.join(str(PROJECT / part) for part in ("src", "tests")),
     "OMP_NUM_THREADS": "1",
     "OPENBLAS_NUM_THREADS": "1",
 }
+ENVIRONMENT = os.environ | OURS
 
 
 def site_settings(survey: Path | None, broker_port: int, address: str, **more: Any) -> dict[str, Any]:
@@ -66,7 +67,12 @@ class Service:
     def start(self) -> None:
         with self.log.open("ab") as log:
             command = [sys.executable, "-m", "standoff", "serve", str(self.path)]
-            self.process = subprocess.Popen(command, stdout=log, stderr=log, env=ENVIRONMENT)
+            self.process = subprocess.Popen(
+                command,
+                stdout=log,
+                stderr=log,
+                env=os.environ | OURS,
+            )
 
     @property
     def state(self) -> Path:
@@ -141,11 +147,16 @@ class Wearable:
         command = [sys.executable, "-m", "standoff", "wearable", "--device", device, "--site", "yard", "--json"]
         command += ["--broker", f"mqtt://127.0.0.1:{port}", *more]
         self._process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=ENVIRONMENT
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            env=os.environ | OURS,
         )
         self.events: list[dict[str, Any]] = []
         self._lines: queue.SimpleQueue[str] = queue.SimpleQueue()
-        threading.Thread(target=self._read, daemon=True).start()
+        self._reading = threading.Thread(target=self._read, daemon=True)
+        self._reading.start()
 
     def _read(self) -> None:
         assert self._process.stdout is not None
@@ -163,6 +174,10 @@ class Wearable:
             one for one in found if all(one["alert"]["data"]["hazard"][name] == value for name, value in wanted.items())
         ]
 
+    def receiver_heard(self) -> bool:
+        """Return whether a word on supervision has come."""
+        return bool(self.of_kind("supervision"))
+
     def level(self) -> str:
         levels = self.of_kind("level")
         return str(levels[-1]["level"]) if levels else "unsupervised"
@@ -179,3 +194,7 @@ class Wearable:
     def __exit__(self, *_: object) -> None:
         self._process.terminate()
         self._process.wait(10)
+        self._reading.join(5.0)
+        for pipe in (self._process.stdin, self._process.stdout):
+            assert pipe is not None
+            pipe.close()

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 import signal
 import socket
+import struct
 import subprocess
+import threading
 import time
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
@@ -74,6 +77,9 @@ class Server:
             self.process.send_signal(signal.SIGCONT)
             self.process.kill()
             self.process.wait()
+            if self.process.stdin is not None:
+                with contextlib.suppress(OSError):
+                    self.process.stdin.close()
             self.process = None
 
     def signal(self, number: int) -> None:
@@ -106,17 +112,13 @@ class RtspServer(Server):
         super().__init__(command, port, folder / f"rtsp-{port}.log")
         self.address = f"rtsp://127.0.0.1:{port}{path}"
 
-    def write(self, data: bytes) -> None:
-        """Write without waiting: while nobody reads, pictures are lost, as a camera's are."""
+    def write(self, data: bytes, *, is_key: bool) -> None:
+        """Send a coded picture."""
         process = self.process
-        if process is None or process.stdin is None:
-            return
-        try:
-            os.set_blocking(process.stdin.fileno(), False)
-            process.stdin.write(data)
-            process.stdin.flush()
-        except (BlockingIOError, BrokenPipeError, ValueError):
-            return
+        if process is not None and process.stdin is not None:
+            with contextlib.suppress(OSError, ValueError):
+                process.stdin.write(struct.pack(">IB", len(data), is_key) + data)
+                process.stdin.flush()
 
 
 @contextmanager
@@ -154,3 +156,49 @@ rtmp {{ server {{ listen 127.0.0.1:{port}; application live {{ live on; sync 10m
         yield server
     finally:
         server.kill()
+
+
+class Cable:
+    """A connection to a server that can be pulled out and plugged in again.
+
+    Args:
+        target: Port of the server.
+    """
+
+    def __init__(self, target: int) -> None:
+        self.port, self._target = free_port(), target
+        self._held: list[socket.socket] = []
+        self._listening: socket.socket | None = None
+        self.plug()
+
+    def plug(self) -> None:
+        self._listening = socket.create_server(("127.0.0.1", self.port))
+        threading.Thread(target=self._serve, args=(self._listening,), daemon=True).start()
+
+    def pull(self) -> None:
+        assert self._listening is not None
+        for one in (self._listening, *self._held):
+            with contextlib.suppress(OSError):
+                one.shutdown(socket.SHUT_RDWR)
+            one.close()
+        self._held.clear()
+
+    def _serve(self, listening: socket.socket) -> None:
+        with contextlib.suppress(OSError):
+            while True:
+                near, _ = listening.accept()
+                far = socket.create_connection(("127.0.0.1", self._target))
+                for one in (near, far):
+                    one.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+                self._held += [near, far]
+                for source, target in ((near, far), (far, near)):
+                    threading.Thread(target=_pump, args=(source, target), daemon=True).start()
+
+
+def _pump(source: socket.socket, target: socket.socket) -> None:
+    with contextlib.suppress(OSError):
+        while data := source.recv(65536):
+            target.sendall(data)
+    for one in (source, target):
+        with contextlib.suppress(OSError):
+            one.shutdown(socket.SHUT_RDWR)

@@ -74,16 +74,19 @@ class DelayMeter:
     def _connection(self, until_s: float, last_shown_s: float) -> float:
         with LiveStream(self._address) as stream:
             newest = _Newest(stream)
-            while not self.is_done and time.monotonic() < until_s and not self.ended.is_set():
-                taken = newest.take()
-                if taken is None:
-                    break
-                gray, arrived_unix_s = taken
-                shown_s = read_clock(gray)
-                # A clock that is seen again says only how long the screen has shown it.
-                if shown_s is not None and shown_s > last_shown_s and 0 <= arrived_unix_s - shown_s <= _LARGEST_S:
-                    last_shown_s = shown_s
-                    self.delays_s.append(arrived_unix_s - shown_s)
+            try:
+                while not self.is_done and time.monotonic() < until_s and not self.ended.is_set():
+                    taken = newest.take()
+                    if taken is None:
+                        break
+                    gray, arrived_unix_s = taken
+                    shown_s = read_clock(gray)
+                    # A clock that is seen again says only how long the screen has shown it.
+                    if shown_s is not None and shown_s > last_shown_s and 0 <= arrived_unix_s - shown_s <= _LARGEST_S:
+                        last_shown_s = shown_s
+                        self.delays_s.append(arrived_unix_s - shown_s)
+            finally:
+                newest.end()
         return last_shown_s
 
 
@@ -94,8 +97,9 @@ class _Newest:
         self._stream = stream
         self._changed = threading.Condition()
         self._picture: tuple[ImageArray, float] | None = None
-        self._is_over = False
-        threading.Thread(target=self._read, daemon=True).start()
+        self._is_over = self._is_ended = False
+        self._thread = threading.Thread(target=self._read, daemon=True)
+        self._thread.start()
 
     def _read(self) -> None:
         try:
@@ -103,12 +107,19 @@ class _Newest:
                 with self._changed:
                     self._picture = (picture.frame.to_ndarray(format="gray"), time.time())
                     self._changed.notify_all()
+                if self._is_ended:
+                    return
         except SourceError:
             pass
         finally:
             with self._changed:
                 self._is_over = True
                 self._changed.notify_all()
+
+    def end(self) -> None:
+        """Read no more: a stream must not be closed while somebody reads it."""
+        self._is_ended = True
+        self._thread.join()
 
     def take(self) -> tuple[ImageArray, float] | None:
         with self._changed:

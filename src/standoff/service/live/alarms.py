@@ -69,13 +69,18 @@ class Alarms:
         self._by_cause = {key: one for key, one in self._by_cause.items() if now_s - one.at_s <= _FORGOTTEN_S}
 
     def due(
-        self, open_hazards: Collection[OpenHazardRow], acknowledged: Collection[str], now: Moment
+        self,
+        open_hazards: Collection[OpenHazardRow],
+        acknowledged: Collection[str],
+        shelves: Collection[Shelf],
+        now: Moment,
     ) -> list[tuple[OpenHazardRow, int, str]]:
         """Return what goes to the next in line: the hazard, how far down the line, and to which device.
 
         Args:
             open_hazards: All that are open.
             acknowledged: Ids of those of which somebody has taken note.
+            shelves: What is set aside: nobody is told of it.
             now: The moment.
         """
         line = self.settings.escalate_to
@@ -83,6 +88,8 @@ class Alarms:
         for row in open_hazards:
             hazard = row.latest
             if hazard.severity != "danger" or hazard.hazard_id in acknowledged:
+                continue
+            if hazard.delay == "unknown" or shelved_by(hazard, shelves):
                 continue
             steps = int(now.since(row.opened) // self.settings.escalate_after_s)
             found += [(row, step, line[step]) for step in range(min(max(steps, 0), len(line)))]

@@ -7,12 +7,12 @@ import os
 import signal
 import threading
 import time
-from typing import Any, Final
+from typing import Final
 
 from standoff.config import SiteSettings, StreamSettings, build_stage
 from standoff.core.errors import StandoffError
 from standoff.core.protocols import Detector
-from standoff.service.live.delays import read_delays
+from standoff.service.live.delays import MeasuredDelay, read_delays
 from standoff.service.live.log import log_of
 from standoff.service.live.outbox import Outbox
 from standoff.service.live.service_clock import ServiceClock
@@ -106,11 +106,9 @@ class Analysis:
         for name in [*self._streams]:
             if name not in site.streams or site.streams[name] != before.streams.get(name):
                 self._streams.pop(name).close(_LEFT_OUT)
-        delays = self._delays()
         for name, settings in site.streams.items():
             if name not in self._streams:
                 detector = self._detector(name, settings)
-                measured = delays.get(name)
                 self._streams[name] = StreamAnalysis(
                     name,
                     site.live.site,
@@ -121,10 +119,12 @@ class Analysis:
                     self._record,
                     lambda about, words: self._workplace.ring("messenger", about, words),
                     self._now,
-                    measured if measured is not None and measured.address == settings.address else None,
                 )
+        for name, measured in self._delays().items():
+            if name in site.streams and measured.address == site.streams[name].address:
+                self._streams[name].measured = measured
 
-    def _delays(self) -> dict[str, Any]:
+    def _delays(self) -> dict[str, MeasuredDelay]:
         try:
             return dict(read_delays(self._site.live.state))
         except StandoffError as error:

@@ -24,6 +24,8 @@ from standoff.service.live.log import log_of
 
 _KEEPALIVE_S: Final = 5
 _CONNECT_S: Final = 3.0
+_LONGEST_PAUSE_S: Final = 1.0
+"""Between two attempts: while the broker is away nobody is warned."""
 _MOST_IN_FLIGHT: Final = 100
 _MOST_QUEUED: Final = 1000
 _QOS: Final = 1
@@ -218,7 +220,7 @@ class Broker:
                 backoff.succeeded()
             if not self._is_ended.is_set():
                 self.news.put(Disconnected(reason or "the connection broke"))
-                self._is_ended.wait(min(backoff.failed(time.monotonic()), 4.0))
+                self._is_ended.wait(min(backoff.failed(time.monotonic()), _LONGEST_PAUSE_S))
 
     def _forget(self, client: mqtt.Client) -> bool:
         """Let go of a client and all that it had not sent yet; return whether it ever was connected."""

@@ -6,16 +6,19 @@ import math
 import os
 import threading
 import time
-import zlib
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import av
+import cv2
+import numpy as np
 
 from standoff.core.errors import SourceError
 from standoff.core.stream_watch import CapturePhase
+from standoff.core.types import ImageArray
 from standoff.service.live.backoff import Backoff
 from standoff.service.live.log import log_of
+from standoff.service.live.shared import PictureSlot
 from standoff.service.live.workplace import Workplace
 from standoff.stages.frames import LiveAddress, LivePicture, LiveStream, StreamRefused
 
@@ -25,8 +28,11 @@ _STUCK_S: Final = 6.0
 STUCK_CODE: Final = 70
 _PLAUSIBLE_S: Final = 60.0
 _AHEAD_S: Final = 1.0
-_TOLD_LASTS_S: Final = 30.0
-_SAMPLED_ROWS: Final = 4
+_TOLD_LASTS_S: Final = 60.0
+_SAMPLED: Final = 4
+"""Every fourth pixel of every fourth row."""
+_CHANGED_LEVELS: Final = 8
+_CHANGED_SAMPLES: Final = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +94,7 @@ class Capture:
         with LiveStream(self._plan.address) as stream:
             self._connections += 1
             self._say("waiting_for_keyframe", "waiting for a picture that is whole")
-            passage = Passage(self._connections)
+            passage = Passage(self._connections, ToldDelay.of_slot(self._slot))
             for picture in stream:
                 self._progress_s = time.monotonic()
                 self._slot.put(picture.frame, passage.about(picture, time.monotonic(), time.time()))
@@ -128,6 +134,26 @@ class Capture:
             self._write()
 
 
+class ToldDelay(NamedTuple):
+    """How late pictures come, by the sender's word.
+
+    Attributes:
+        delay_s: From capture to arrival.
+        at_s: When it was told last, monotonic.
+    """
+
+    delay_s: float
+    at_s: float
+
+    @classmethod
+    def of_slot(cls, slot: PictureSlot) -> ToldDelay | None:
+        """Return what was told with the newest picture, by this process or one before it; None where nothing was."""
+        found = slot.about()
+        if found is None or found[1].get("delay_told_s") is None or found[1]["delay_s"] is None:
+            return None
+        return cls(found[1]["delay_s"], found[1]["delay_told_s"])
+
+
 class Passage:
     """What is said with each picture of one connection.
 
@@ -136,14 +162,15 @@ class Passage:
 
     Args:
         connection: Its number.
+        told: What an earlier connection was told of the delay: senders tell it some seconds after they begin, and in
+            these seconds, too, somebody may be in danger.
     """
 
-    def __init__(self, connection: int) -> None:
+    def __init__(self, connection: int, told: ToldDelay | None = None) -> None:
         self._connection = connection
         self._wall_offset_s: float | None = None
-        self._told_s = -math.inf
-        self._delay_s = math.nan
-        self._look, self._changed_s = -1, -math.inf
+        self._told = told
+        self._stillness, self._changed_s = Stillness(), -math.inf
 
     def about(self, picture: LivePicture, now_s: float, unix_s: float) -> dict[str, float | int | str | None]:
         """Return it.
@@ -153,9 +180,8 @@ class Passage:
             now_s: Monotonic.
             unix_s: By the wall clock of this machine.
         """
-        look = _look_of(picture.frame)
-        if look != self._look:
-            self._look, self._changed_s = look, now_s
+        if self._stillness.has_changed(picture.frame):
+            self._changed_s = now_s
         told = self._take_told(picture.told_unix_s, now_s, unix_s)
         return {
             "connection": self._connection,
@@ -164,7 +190,8 @@ class Passage:
             "arrived_unix_s": unix_s,
             "changed_s": self._changed_s,
             # The last delay that was told holds for the next pictures, too: senders do not tell it of each.
-            "delay_s": self._delay_s if now_s - self._told_s < _TOLD_LASTS_S else None,
+            "delay_s": None if self._told is None or now_s - self._told.at_s > _TOLD_LASTS_S else self._told.delay_s,
+            "delay_told_s": None if self._told is None else self._told.at_s,
             "told_unix_s": picture.told_unix_s if told else None,
             "told_by": "rtcp" if told else "arrival",
         }
@@ -180,19 +207,33 @@ class Passage:
         delay_s = now_s - (told_unix_s - self._wall_offset_s)
         if not -_AHEAD_S <= delay_s <= _PLAUSIBLE_S:
             return False
-        self._delay_s, self._told_s = max(delay_s, 0.0), now_s
+        self._told = ToldDelay(max(delay_s, 0.0), now_s)
         return True
 
 
-def _look_of(frame: av.VideoFrame) -> int:
-    """Return a number that changes with the picture: of every fourth row's brightness."""
-    plane = frame.planes[0]
-    width = plane.line_size
-    rows = memoryview(plane).cast("B")
-    look = 0
-    for row in range(0, frame.height, _SAMPLED_ROWS):
-        look = zlib.crc32(rows[row * width : row * width + frame.width], look)
-    return look
+class Stillness:
+    """Tells whether pictures change: a camera that hangs, or a relay that repeats, sends the same one for ever.
+
+    Coded anew, the same picture is never quite the same: a key frame differs from the picture before it in all places,
+    a little, and the next few correct it. Something that moves, and the noise of a camera that is alive, change some
+    places by more. Key frames after one another, of senders that send nothing else, are pictures like others.
+    """
+
+    def __init__(self) -> None:
+        self._before: ImageArray | None = None
+        self._was_key_frame = False
+
+    def has_changed(self, frame: av.VideoFrame) -> bool:
+        """Return whether a picture shows something else than the one before; the first one does."""
+        plane = frame.planes[0]
+        rows = np.frombuffer(plane, np.uint8)[: plane.line_size * frame.height].reshape(frame.height, plane.line_size)
+        look = rows[::_SAMPLED, : frame.width : _SAMPLED].copy()
+        before, self._before = self._before, look
+        was_key_frame, self._was_key_frame = self._was_key_frame, bool(frame.key_frame)
+        if before is None or before.shape != look.shape:
+            return True
+        changed = np.count_nonzero(cv2.absdiff(before, look) >= _CHANGED_LEVELS)
+        return bool(changed >= _CHANGED_SAMPLES) and (was_key_frame or not frame.key_frame)
 
 
 def run(workplace: Workplace, stream: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Final
@@ -49,17 +50,20 @@ def read_delays(folder: Path) -> dict[str, MeasuredDelay]:
         delays = {str(name): MeasuredDelay(**one) for name, one in told.items()}
         if not all(math.isfinite(one.delay_s) and one.delay_s >= 0 for one in delays.values()):
             raise ValueError("a delay that is none")
-    except (AttributeError, TypeError, ValueError) as error:
+    except (AttributeError, TypeError, ValueError, OverflowError) as error:
         raise DataError(expected=f"delays in {path}", found=str(error), fix="measure again") from None
     return delays
 
 
 def keep_delay(folder: Path, stream: str, measured: MeasuredDelay) -> MeasuredDelay:
-    """Keep what was measured of a stream, and return it.
+    """Keep what was measured of a stream, and return it; what a damaged file held is gone.
 
     Raises:
         OutputError: It cannot be written.
     """
-    delays = {**read_delays(folder), stream: measured}
+    known: dict[str, MeasuredDelay] = {}
+    with suppress(DataError):
+        known = read_delays(folder)
+    delays = {**known, stream: measured}
     write_json(folder / _FILE, {name: asdict(one) for name, one in delays.items()})
     return measured

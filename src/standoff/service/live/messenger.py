@@ -93,7 +93,7 @@ class Messenger:
         self._recall_told()
         self._broker = Broker(
             broker_access(site.live.broker),
-            f"standoff-{site.live.site}",
+            f"standoff-service-{site.live.site}",
             self._subscriptions(),
             LastWill(self._topics.service, b"online", b"offline"),
         )
@@ -166,6 +166,8 @@ class Messenger:
         if isinstance(news, Connected):
             self._is_connected = True
             self._in_flight.clear()
+            # A broker that began anew has forgotten what it had kept.
+            self._send_now(self._health_letters())
             if self._site.live.broker.home_assistant:
                 for topic, payload in discovery(self._site, self._topics):
                     self._broker.send(topic, payload, retained=True)
@@ -239,7 +241,7 @@ class Messenger:
             self._outbox.route(news.id, letters)
             if hazard_id:
                 self._note_told(hazard_id, letters, is_over=told.phase == "closed")  # type: ignore[union-attr]
-        due = self._alarms.due(self._outbox.open_hazards(), self._outbox.acknowledged(), now)
+        due = self._alarms.due(self._outbox.open_hazards(), self._outbox.acknowledged(), shelves, now)
         for row, step, device in due:
             if step < self._escalated.get(row.latest.hazard_id, 0):
                 continue
@@ -256,6 +258,13 @@ class Messenger:
             return
         found = (self._topics.device_of(letter.topic) for letter in letters)
         self._told_devices.setdefault(hazard_id, set()).update(one[0] for one in found if one is not None)
+
+    def _health_letters(self) -> list[Letter]:
+        """Return the latest state of each stream, to be told again."""
+        latest = self._outbox.latest_health()
+        writer = LetterWriter(self._site.live, self._topics, self._recipients, self._alarms)
+        there = [news for news in latest if news.told.stream in self._site.streams]
+        return [letter for news in there for letter in writer.letters(news, (), ())]
 
     def _recall_told(self) -> None:
         """Find out whom an earlier messenger has told of what is still open."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import hmac
+import math
 import queue
 import threading
 import urllib.error
@@ -12,6 +13,8 @@ from collections.abc import Sequence
 from typing import Final
 
 from standoff.config import NotifySettings
+from standoff.core.lengths import METRES
+from standoff.messages import HazardNews, read_event
 from standoff.service.live.log import log_of
 
 TOPIC: Final = "notify:"
@@ -97,7 +100,22 @@ class Notifier:
         if not told.add(self._settings.apprise.value):
             self._log.error("apprise does not know this address")
             return False
-        return bool(told.notify(title=title, body=body))
+        return bool(told.notify(title=title, body=in_words(body)))
+
+
+def in_words(body: str) -> str:
+    """Return what an event says, for people.
+
+    Args:
+        body: A CloudEvent of a hazard.
+    """
+    _, hazard, _ = read_event(body.encode(), HazardNews)
+    who = " and ".join(one.replace("_", " ") for one in hazard.classes) or "nobody in particular"
+    where = f"in or near {hazard.zone}" if hazard.zone else ""
+    is_far = hazard.distance_m is not None and not hazard.zone
+    far = METRES.distance(hazard.distance_m or 0.0, hazard.sigma_m or math.nan) if is_far else ""
+    parts = [f"{hazard.severity.upper()}: {who}", where, far, hazard.reason, f"stream {hazard.stream}"]
+    return ", ".join(filter(None, parts))
 
 
 def signature(payload: bytes, secret: str) -> str:

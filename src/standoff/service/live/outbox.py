@@ -40,6 +40,7 @@ CREATE TABLE IF NOT EXISTS shelf (
 _KEPT_DAYS: Final = 30
 _BUSY_MS: Final = 5000
 _DAY_S: Final = 86_400.0
+_LONGEST_REASON: Final = 500
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,7 +186,7 @@ class Outbox:
         """
         ids = tuple(str(ULID()) for _ in told)
         with self._writing():
-            for news_id, one in zip(ids, told, strict=True):
+            for news_id, one in zip(ids, map(_readable, told), strict=True):
                 kind = "hazard" if isinstance(one, HazardNews) else "health"
                 self._db.execute(
                     "INSERT INTO news (id, kind, stream, body, captured_s, clock, at_s, at_unix_s)"
@@ -207,6 +208,14 @@ class Outbox:
             (hazard.hazard_id, hazard.stream, _text(hazard), *at),
         )
 
+    def latest_health(self) -> list[News]:
+        """Return the latest news of the state of each stream, of which letters are written already."""
+        rows = self._db.execute(
+            "SELECT id, kind, body, captured_s, clock, at_s, at_unix_s FROM news WHERE number IN"
+            " (SELECT max(number) FROM news WHERE kind = 'health' AND routed = 1 GROUP BY stream)"
+        )
+        return [News(row[0], _told(row[1], row[2]), row[3], Moment(*row[4:])) for row in rows]
+
     def unrouted(self, most: int = 200) -> list[News]:
         """Return the oldest news for which nobody has written letters yet."""
         rows = self._db.execute(
@@ -220,15 +229,16 @@ class Outbox:
         """Write the letters of some news, all or none; what is retained takes the place of what still waits there."""
         with self._writing():
             for one in letters:
-                if one.retained:
-                    self._end("superseded", "state = 'waiting' AND retained = 1 AND topic = ?", (one.topic,), one.at)
                 values = asdict(one)
                 at: Sequence[Any] = one.at
-                self._db.execute(
+                is_new = self._db.execute(
                     "INSERT OR IGNORE INTO letter (id, news_id, topic, body, valid_s, retained, captured_s, clock,"
                     " at_s, at_unix_s) VALUES (?,?,?,?,?,?,?,?,?,?)",
                     (*(values[name] for name in _LETTER_COLUMNS), *at),
-                )
+                ).rowcount
+                if one.retained and is_new:
+                    older = "state = 'waiting' AND retained = 1 AND topic = ? AND id != ?"
+                    self._end("superseded", older, (one.topic, one.id), one.at)
             self._db.execute("UPDATE news SET routed = 1 WHERE id = ?", (news_id,))
 
     def waiting(self, most: int = 200) -> list[Letter]:
@@ -360,6 +370,11 @@ class Outbox:
 
 
 _LETTER_COLUMNS: Final = ("id", "news_id", "topic", "body", "valid_s", "retained", "captured_s")
+
+
+def _readable(told: HazardNews | HealthNews) -> HazardNews | HealthNews:
+    """Return news with a reason that can be read again, whatever somebody's error had to say."""
+    return replace(told, reason=told.reason.encode(errors="replace").decode()[:_LONGEST_REASON])
 
 
 def _text(told: HazardNews | HealthNews) -> str:

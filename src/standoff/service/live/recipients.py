@@ -27,6 +27,7 @@ _FLOOR_M: Final = 0.3
 _NEAR_M: Final = 8.0
 _ENOUGH_SHARE: Final = 0.9
 _LEAST_SHARE: Final = 0.05
+_LONGEST_REASON: Final = 500
 
 NO_POSITION: Final = "your position is not known"
 NOT_SEEN: Final = "nobody is seen where you are"
@@ -152,7 +153,10 @@ class Recipients:
             if receiver.wearer == "nobody"
             else self._over_wearer(state, receiver.wearer, now_s)
         )
-        return Supervision(device, sequence, not reason, reason, tuple(sorted(streams)), len(state.tracks))
+        # Of many streams not all reasons fit into a message.
+        return Supervision(
+            device, sequence, not reason, reason[:_LONGEST_REASON], tuple(sorted(streams)), len(state.tracks)
+        )
 
     def _over_wearer(self, state: DeviceState, wearer: str, now_s: float) -> tuple[set[str], str]:
         """Return which streams see a wearer, and why nobody would warn him; "" where somebody would."""
@@ -166,7 +170,7 @@ class Recipients:
                 reasons.append(why)
             else:
                 seeing.add(stream)
-        return seeing, "" if seeing else (reasons[0] if len(set(reasons)) == 1 else "; ".join(dict.fromkeys(reasons)))
+        return seeing, "" if seeing else "; ".join(dict.fromkeys(reasons)) or NO_STREAM
 
     def _unsupervised_by(self, stream: str, state: DeviceState, now_s: float) -> str:
         sighting = self._sightings.get(stream)

@@ -100,7 +100,7 @@ class PictureSlot:
         self._path = folder / f"{name}.pictures"
         self._record = SharedRecord(folder / f"{name}.picture", 4096)
         self._map: mmap.mmap | None = None
-        self._number = 0
+        self._number = self._place_bytes = 0
 
     def __enter__(self) -> Self:
         return self
@@ -124,6 +124,9 @@ class PictureSlot:
         room = _room(pixels.nbytes)
         if self._map is None or len(self._map) < _PICTURES * room:
             self._map = _mapped(self._path, _PICTURES * room)
+        if room != self._place_bytes:
+            self._take_back(self._map)
+            self._place_bytes = room
         self._number += 1
         begin = (self._number % _PICTURES) * room
         # Marked before and after: whoever read it meanwhile sees that it has changed.
@@ -135,6 +138,15 @@ class PictureSlot:
         self._record.write(
             {"number": self._number, "size_px": [width_px, height_px], "is_full": is_full, "room": room, "about": about}
         )
+
+    def _take_back(self, places: mmap.mmap) -> None:
+        """Make all pictures unreadable before one of another size is put across them."""
+        head = self._record.read()
+        if head is None:
+            return
+        for begin in range(0, _PICTURES * int(head["room"]), int(head["room"])):
+            if begin + _COUNT.size <= len(places):
+                places[begin : begin + _COUNT.size] = _COUNT.pack(0)
 
     def newest(self) -> SlotPicture | None:
         """Return the newest picture, copied; None where there is none, or it is just changing again and again."""

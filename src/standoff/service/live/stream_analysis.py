@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import sqlite3
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from datetime import UTC, datetime
 from typing import Any, Final
 
@@ -35,6 +37,7 @@ from standoff.stages.frames import AvPicture, Scaler
 
 _TICK_S: Final = 0.25
 _ZONES_EVERY_S: Final = 1.0
+_SHOW_EVERY_S: Final = 0.4
 _SETTLED_S: Final = 5.0
 """How long a stream must be measured anew before what an earlier session left open is closed."""
 _BEGUN_ANEW: Final = "the analysis began anew"
@@ -57,6 +60,8 @@ class StreamAnalysis:
         record: Of what was watched.
         tell: Rings the messenger.
         now: The clock.
+
+    Attributes:
         measured: How late its pictures come, where somebody has measured it.
     """
 
@@ -71,14 +76,14 @@ class StreamAnalysis:
         record: WatchedRecord,
         tell: Tell,
         now: Now,
-        measured: MeasuredDelay | None = None,
     ) -> None:
         self.name, self._site, self._settings = name, site, settings
         self._workplace, self._detector, self._outbox = workplace, detector, outbox
         self._record, self._tell, self._now = record, tell, now
-        self._measured = measured
+        self.measured: MeasuredDelay | None = None
         self._log = log_of("analysis", stream=name)
         self._slot, self._capture = workplace.pictures(name), workplace.capture_record(name)
+        self._shown, self._shown_s = workplace.analysed(name), -math.inf
         self._words, self._telemetry = workplace.stream_record(name), workplace.telemetry_record(name)
         self._zones = [(zone.name, zone_grid_m(zone)) for zone in build_zones(settings.settings)]
         self._scaler = Scaler()
@@ -126,10 +131,7 @@ class StreamAnalysis:
         result = monitor.step(frame)
         self._frames += 1
         self._latest = result
-        events = self._news_of(result.hazards)
-        if events:
-            self._outbox.tell(events, self._now(), self._captured_s)
-            self._tell("news", {})
+        self._publish(result.hazards)
         ended_s = time.monotonic()
         self._seen_s = ended_s
         self._latencies.add((ended_s - taken.about["arrived_s"]) * 1e3)
@@ -137,14 +139,15 @@ class StreamAnalysis:
         if "detect" in result.stage_ms:
             self._detecting.add(result.stage_ms["detect"])
         self._settle(result, ended_s)
+        self._show(taken, ended_s)
         self.check(ended_s)
         self._tell("sighting", self._sighting(result, ended_s).words())
         self._record.note_ground(self.name, result.watched, self._watched_zones)
 
     def fail(self, problem: str) -> None:
         """Take that looking failed: the monitor is given up, and a new one is made for the next picture."""
-        self._problem, self._problem_s = problem, time.monotonic()
-        self._lose(f"its analysis failed: {problem}")
+        self._problem, self._problem_s = f"its analysis failed: {problem}", time.monotonic()
+        self._lose(self._problem)
         self._monitor = None
 
     def check(self, now_s: float) -> None:
@@ -189,14 +192,18 @@ class StreamAnalysis:
         self._words.write(words)
 
     def close(self, reason: str) -> None:
-        """End: what is open is unknown from now on."""
+        """End: what is open is unknown from now on, and nobody may take the stream for live."""
+        self._condition = StreamCondition("lost", reason)
+        self._tell_health()
         self._lose(reason)
         self._slot.close()
+        self._shown.close()
 
     def _lose(self, reason: str) -> None:
         if self._monitor is not None:
             self._publish(self._monitor.close(self._clock.now_s(), lost=reason))
-        self._outbox.leave_unknown(self.name, reason, self._now())
+        with suppress(sqlite3.Error):
+            self._outbox.leave_unknown(self.name, reason, self._now())
         self._tell("news", {})
 
     def _found(self, now_s: float) -> StreamCondition:
@@ -209,15 +216,16 @@ class StreamAnalysis:
         limits = self._settings.capture.watch
         found = stream_condition(word, picture, now_s, limits, enabled=self._settings.capture.enabled)
         if found.state == "live" and now_s - self._problem_s < limits.lost_after_s:
-            return StreamCondition("lost", f"its analysis failed: {self._problem}")
+            return StreamCondition("lost", self._problem)
+        self._problem = ""
         return found
 
     def _delay_of(self, about: dict[str, Any]) -> tuple[float, Delay]:
         """Return how long a picture took from its capture to here, NaN where nobody knows, and who says so."""
         if about["delay_s"] is not None:
             return float(about["delay_s"]), "told"
-        if self._measured is not None:
-            return self._measured.delay_s, "measured"
+        if self.measured is not None:
+            return self.measured.delay_s, "measured"
         bound_s = self._settings.capture.delay_bound_s
         return (math.nan, "unknown") if bound_s is None else (bound_s, "bound")
 
@@ -258,6 +266,14 @@ class StreamAnalysis:
             self._measured_since_s = None
         return self._monitor
 
+    def _show(self, taken: SlotPicture, now_s: float) -> None:
+        """Let the page have the picture that was analysed, with what was seen in it, now and then."""
+        if now_s - self._shown_s >= _SHOW_EVERY_S:
+            self._shown_s = now_s
+            with suppress(OSError):
+                self._shown.put(taken.frame, {"arrived_s": taken.about["arrived_s"]})
+            self.write_words()
+
     def _settle(self, result: FrameResult, now_s: float) -> None:
         """Close what an earlier session left open, once this one has measured for a while: it would have been told."""
         if not result.ground:
@@ -266,7 +282,8 @@ class StreamAnalysis:
             self._measured_since_s = now_s
         elif now_s - self._measured_since_s >= _SETTLED_S:
             self._measured_since_s = math.inf
-            self._outbox.close_left(self.name, self.session, _NOT_FOLLOWED, self._now())
+            with suppress(sqlite3.Error):
+                self._outbox.close_left(self.name, self.session, _NOT_FOLLOWED, self._now())
             self._tell("news", {})
 
     def _sighting(self, result: FrameResult, now_s: float) -> Sighting:
@@ -295,9 +312,18 @@ class StreamAnalysis:
         )
 
     def _publish(self, hazards: Sequence[Hazard]) -> None:
-        events = self._news_of(hazards)
-        if events:
-            self._outbox.tell(events, self._now(), self._captured_s)
+        if hazards:
+            self._write_down(self._news_of(hazards), self._captured_s)
+
+    def _write_down(self, news: Sequence[HazardNews | HealthNews], captured_s: float | None = None) -> None:
+        """Write news into the outbox; where that cannot be, nobody would be warned: the stream is not live then."""
+        try:
+            self._outbox.tell(news, self._now(), captured_s)
+        except sqlite3.Error as error:
+            if not self._problem:
+                self._log.critical("nobody is told", error=str(error))
+            self._problem, self._problem_s = f"what happens cannot be written down: {error}", time.monotonic()
+        else:
             self._tell("news", {})
 
     def _news_of(self, hazards: Sequence[Hazard]) -> list[HazardNews]:
@@ -342,8 +368,7 @@ class StreamAnalysis:
         state, reason = self._condition
         self._log.info("state", state=state, reason=reason)
         news = HealthNews(self._site, self.name, state, reason[:500], self._clock.now_s(), since)
-        self._outbox.tell([news], at)
-        self._tell("news", {})
+        self._write_down([news])
 
 
 def _number(value: float) -> float | None:

@@ -163,17 +163,17 @@ class Supervisor:
     """Runs a site until it is asked to end.
 
     Args:
-        path: Of the site's settings.
+        path: Of the site's settings, for when they are to be read again.
+        site: The settings.
         tell: Called with the address of the status page.
 
     Raises:
         StandoffError: The settings, the state's folder, or another service on it.
     """
 
-    def __init__(self, path: Path, tell: Callable[[str], None]) -> None:
-        self._path, self._tell = path, tell
+    def __init__(self, path: Path, site: SiteSettings, tell: Callable[[str], None]) -> None:
+        self._path, self.site, self._tell = path, site, tell
         self._log = log_of("supervisor")
-        self.site = load_site(path)
         state = self.site.live.state
         make_folder(state)
         try:
@@ -301,7 +301,7 @@ def running_service(state: Path) -> Mapping[str, Any]:
         ConfigError: None does.
     """
     path = state / _RUN_FILE
-    with contextlib.suppress(StandoffError, OSError, ValueError):
+    with contextlib.suppress(StandoffError, OSError, ValueError, KeyError, TypeError):
         words = parse_json(read_text(path, "a running service", ConfigError), "a running service", str(path))
         if isinstance(words, dict) and _is_alive(int(words["pid"])):
             return words
@@ -358,9 +358,10 @@ def _remove_left(state: Path) -> None:
 def _is_alive(pid: int) -> bool:
     try:
         os.kill(pid, 0)
-    except OSError:
+    except (OSError, OverflowError):
         return False
-    return True
+    # Zero and less name groups of processes, and a signal is for one.
+    return pid > 0
 
 
 def _tell_systemd(word: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -24,8 +25,10 @@ PICTURE: Final = "the ground in the picture"
 _WRITE_EVERY_S: Final = 10.0
 _LONGEST_STEP_S: Final = 5.0
 """Longer, and nobody was there to look."""
+_LEAST_STEP_S: Final = 1e-3
 _LEAST_GAP_S: Final = 1.0
 _NOT_RUNNING: Final = "the service was not running"
+_NOT_BEGUN: Final = "nobody watched it yet"
 _NOT_JUDGED: Final = "nobody has judged it yet"
 _SLEPT: Final = "the service was held up"
 _LIVE: Final = ("live", "late")
@@ -110,7 +113,12 @@ class WatchedRecord:
         if span != self._span:
             self.write()
             self._streams, self._span = {}, span
-        if before is None or span is None:
+        if span is None:
+            return
+        if before is None:
+            reason_before = _NOT_RUNNING if stream in self._streams else _NOT_BEGUN
+            record = self._streams.setdefault(stream, StreamRecord(until_unix_s=span.begin_unix_s))
+            _note_absence(record, now.unix_s, reason_before)
             return
         passed_s = min(now.since(before), now.unix_s - span.begin_unix_s)
         if passed_s <= 0.0:
@@ -128,7 +136,9 @@ class WatchedRecord:
     def _count(self, stream: str, record: StreamRecord, state: str, reason: str, passed_s: float) -> None:
         shares = self._shares.get(stream, {})
         for place in {PICTURE, *shares, *record.places}:
-            counted = record.places.setdefault(place, PlaceRecord())
+            is_new, counted = place not in record.places, record.places.setdefault(place, PlaceRecord())
+            if is_new and (before_s := sum(record.states_s.values()) - passed_s) > _LEAST_STEP_S:
+                counted.unwatched_s[_NOT_JUDGED] += before_s
             if state not in _LIVE:
                 counted.unwatched_s[reason or state] += passed_s
             elif place not in shares:
@@ -178,17 +188,13 @@ class WatchedRecord:
         try:
             told = read_json(path, "the record of a day", DataError)
             self._streams = {name: _stream_record(one) for name, one in told["streams"].items()}
-        except (StandoffError, KeyError, TypeError, ValueError, AttributeError):
+        except (StandoffError, KeyError, TypeError, ValueError, AttributeError, OverflowError):
             # Kept under another name: somebody may want to know what it was.
             path.replace(path.with_suffix(".unreadable"))
             return
-        now_unix_s = self._now().unix_s
         for record in self._streams.values():
-            passed_s = max(0.0, now_unix_s - record.until_unix_s)
-            record.states_s["lost"] += passed_s
-            for place in record.places.values():
-                place.unwatched_s[_NOT_RUNNING] += passed_s
-            _note_gap(record, record.until_unix_s, now_unix_s, "lost", _NOT_RUNNING)
+            record.until_unix_s = max(record.until_unix_s, self._span.begin_unix_s)
+            _note_absence(record, self._now().unix_s, _NOT_RUNNING)
 
 
 @dataclass(frozen=True, slots=True)
@@ -245,13 +251,40 @@ def _note_gap(record: StreamRecord, begin_unix_s: float, end_unix_s: float, stat
     record.gaps.append({**gap, "begin_unix_s": begin_unix_s, "end_unix_s": end_unix_s})
 
 
+def _note_absence(record: StreamRecord, until_unix_s: float, reason: str) -> None:
+    """Count what passed since a stream was counted last as time in which nobody watched it."""
+    passed_s = until_unix_s - record.until_unix_s
+    if passed_s <= 0.0:
+        return
+    for place in {PICTURE, *record.places}:
+        record.places.setdefault(place, PlaceRecord()).unwatched_s[reason] += passed_s
+    record.states_s["lost"] += passed_s
+    _note_gap(record, record.until_unix_s, until_unix_s, "lost", reason)
+    record.until_unix_s = until_unix_s
+
+
 def _stream_record(told: Mapping[str, Any]) -> StreamRecord:
-    record = StreamRecord(until_unix_s=datetime.fromisoformat(told["until"]).timestamp(), gaps=list(told["gaps"]))
-    record.states_s.update({str(name): float(seconds) for name, seconds in told["states_s"].items()})
+    until = datetime.fromisoformat(told["until"]).timestamp()
+    record = StreamRecord(until_unix_s=until, gaps=[_gap(one) for one in told["gaps"]])
+    record.states_s.update({str(name): _seconds(seconds) for name, seconds in told["states_s"].items()})
     for name, one in told["places"].items():
-        place = record.places.setdefault(name, PlaceRecord(float(one["watched_s"])))
-        place.unwatched_s.update({str(reason): float(seconds) for reason, seconds in one["unwatched_s"].items()})
+        place = record.places.setdefault(name, PlaceRecord(_seconds(one["watched_s"])))
+        place.unwatched_s.update({str(reason): _seconds(seconds) for reason, seconds in one["unwatched_s"].items()})
     return record
+
+
+def _gap(told: Mapping[str, Any]) -> dict[str, Any]:
+    reasons = [str(one) for one in told["reasons"]]
+    if not reasons:
+        raise ValueError("a gap without a reason")
+    begin, end = _seconds(told["begin_unix_s"]), _seconds(told["end_unix_s"])
+    return {"begin": _utc(begin), "end": _utc(end), "reasons": reasons, "begin_unix_s": begin, "end_unix_s": end}
+
+
+def _seconds(told: object) -> float:
+    if isinstance(told, bool) or not isinstance(told, (int, float)) or not math.isfinite(told):
+        raise ValueError("a number that is none")
+    return float(told)
 
 
 def _utc(unix_s: float) -> str:

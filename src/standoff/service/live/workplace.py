@@ -99,6 +99,10 @@ class Workplace:
         """Return where a stream's newest picture is."""
         return PictureSlot(self.folder, f"stream-{stream}")
 
+    def analysed(self, stream: str) -> PictureSlot:
+        """Return where the newest picture of a stream is that was analysed."""
+        return PictureSlot(self.folder, f"stream-{stream}-analysed")
+
     def record(self, process: str) -> SharedRecord:
         """Return what a process of the service says of itself."""
         return SharedRecord(self.folder / f"{process}.record")

@@ -69,6 +69,7 @@ def _token(state: Path) -> str:
             return kept
     token = secrets.token_urlsafe(32)
     descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
+    os.fchmod(descriptor, 0o600)
     with os.fdopen(descriptor, "w", encoding="ascii") as file:
         file.write(token)
     return token

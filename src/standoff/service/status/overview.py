@@ -78,11 +78,15 @@ class Overview:
         return HealthAnswer(overall=status.overall, problems=status.problems)
 
     def picture(self, stream: str) -> tuple[bytes, float] | None:
-        """Return a stream's newest picture as JPEG, and how many seconds ago it came; None: there is none."""
+        """Return a stream's newest picture as JPEG, and how many seconds ago it came; None: there is none.
+
+        The newest that was analysed, where there is one: what was seen belongs to it.
+        """
         if stream not in self._workplace.plan().streams:
             return None
+        analysed = self._slots.setdefault(f"{stream}-analysed", self._workplace.analysed(stream))
         slot = self._slots.setdefault(stream, self._workplace.pictures(stream))
-        taken = slot.newest()
+        taken = analysed.newest() or slot.newest()
         if taken is None:
             return None
         frame = taken.frame

@@ -6,14 +6,16 @@ import json
 import math
 from collections import OrderedDict
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Final, Literal, TypeVar
 
 from standoff.core.hazards import GRAVENESS, Severity
-from standoff.messages import Alert, Supervision, Timing, Unreadable, read_event
+from standoff.messages import Alert, HazardNews, Supervision, Timing, Unreadable, read_event
 from standoff.service.wearable.device_clock import DeviceClock
 
 Level = Literal["danger", "warning", "unknown", "unsupervised", "supervised"]
 """What is shown, the gravest first."""
+
+Value = TypeVar("Value")
 
 _SILENCE_MS: Final = 3000.0
 _KNOWN: Final = 5000
@@ -76,6 +78,7 @@ class Receiver:
         self.clock = DeviceClock()
         self._known: OrderedDict[str, None] = OrderedDict()
         self._held: dict[str, _Held] = {}
+        self._newest: OrderedDict[str, tuple[float, bool]] = OrderedDict()
         self._supervision: Supervision | None = None
         self._heard_ms = -math.inf
         self._level: Level = "unsupervised"
@@ -111,10 +114,12 @@ class Receiver:
         if event_id in self._known:
             return Signal(dropped="known already")
         remaining_ms = self._remaining_ms(timing, now_ms)
-        self._remember(event_id)
+        _remember(self._known, event_id, None)
         if remaining_ms <= 0.0:
             return Signal(dropped="too late")
         hazard = alert.hazard
+        if self._is_overtaken(hazard):
+            return Signal(dropped="overtaken by a newer one")
         before = self._held.get(hazard.hazard_id)
         if hazard.phase == "closed":
             self._held.pop(hazard.hazard_id, None)
@@ -122,7 +127,7 @@ class Receiver:
             graver = before is not None and _rank(alert) > _rank(before.alert)
             noted = before is not None and before.is_acknowledged and not graver
             self._held[hazard.hazard_id] = _Held(alert, now_ms + remaining_ms, noted)
-        # An event that came late after a newer one must not sound; one that asks to be silent never does.
+        # One that asks to be silent never sounds.
         sounds = "" if alert.silent or hazard.phase == "closed" else _level_of(alert)
         echo = json.dumps({"id": event_id, "held_ms": 0.0}).encode()
         return Signal("echo", echo, sounds)
@@ -141,8 +146,9 @@ class Receiver:
         """Return what is shown at a moment."""
         self._drop_old(now_ms)
         silence_s = (now_ms - self._heard_ms) / 1e3
-        gravest = max(self._held.values(), key=lambda held: _rank(held.alert), default=None)
-        if gravest is not None and not (gravest.is_acknowledged and _level_of(gravest.alert) != "danger"):
+        standing = [one for one in self._held.values() if not one.is_acknowledged or _level_of(one.alert) == "danger"]
+        gravest = max(standing, key=lambda held: (_rank(held.alert), not held.is_acknowledged), default=None)
+        if gravest is not None:
             alert = gravest.alert
             return Shown(_level_of(alert), alert.hazard.reason, alert, gravest.is_acknowledged, silence_s)
         if now_ms - self._heard_ms > _SILENCE_MS or self._supervision is None:
@@ -165,13 +171,25 @@ class Receiver:
         remaining_ms = None if timing is None else self.clock.remaining_ms(timing, now_ms)
         return _UNKNOWN_OFFSET_MS if remaining_ms is None else remaining_ms
 
-    def _remember(self, event_id: str) -> None:
-        self._known[event_id] = None
-        while len(self._known) > _KNOWN:
-            self._known.popitem(last=False)
+    def _is_overtaken(self, hazard: HazardNews) -> bool:
+        """Return whether something newer is known of a hazard: what waited for the broker may come after what did not.
+
+        Several may be told of one moment; of a hazard that is over no other is.
+        """
+        newest_s, is_over = self._newest.get(hazard.hazard_id, (-math.inf, False))
+        if hazard.time_s < newest_s or (is_over and hazard.time_s <= newest_s):
+            return True
+        _remember(self._newest, hazard.hazard_id, (hazard.time_s, hazard.phase == "closed"))
+        return False
 
     def _drop_old(self, now_ms: float) -> None:
         self._held = {key: held for key, held in self._held.items() if held.until_ms > now_ms}
+
+
+def _remember(known: OrderedDict[str, Value], name: str, value: Value) -> None:
+    known[name] = value
+    while len(known) > _KNOWN:
+        known.popitem(last=False)
 
 
 def _level_of(alert: Alert) -> Severity:

@@ -54,7 +54,7 @@ class Wearable:
         self.receiver = Receiver(device)
         self._vibrations = read_vibrations()
         self.is_connected = False
-        self._broker = Broker(access, f"standoff-{device}", [self._topics.alert, self._topics.supervision])
+        self._broker = Broker(access, f"standoff-device-{device}", [self._topics.alert, self._topics.supervision])
 
     def step(self, longest_s: float) -> None:
         """Take what comes within so long; the rest of the time there is nothing to do."""
@@ -93,7 +93,9 @@ class Wearable:
         done: Signal = take(news.payload, arrived_ms)
         if done.sounds:
             self._sound(done.sounds)
-        if is_alert:
+        if not is_alert:
+            self._say({"event": "supervision", "dropped": done.dropped, "at_s": news.at_s})
+        else:
             event = json.loads(news.payload) if not done.dropped or done.dropped == "too late" else {}
             self._say(
                 {"event": "alert", "dropped": done.dropped, "sounds": done.sounds, "at_s": news.at_s, "alert": event}

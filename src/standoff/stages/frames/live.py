@@ -2,7 +2,7 @@
 
 What was measured of libav (FFmpeg 8) and shapes this: opening hangs on silent peers unless PyAV's own `timeout` is
 given; RTSP that sends no pictures opens all the same; a sender that is killed ends the stream without an error; threads
-by frame delay pictures by several of them, and automatic threads damage those that come in parts.
+by frame delay pictures by several of them; key frames that come in several packets are read wrongly unless told so.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Self
 
 import av
+from av.codec.context import Flags2
 
 from standoff.core.errors import SourceError
 from standoff.stages.frames.live_address import PROTOCOLS, LiveAddress
@@ -27,7 +28,10 @@ _READ_S: Final = 0.75
 """A silent sender is noticed after twice as long."""
 _KEPT_TIMES: Final = 64
 _DAMAGED_IN_A_ROW: Final = 50
-_QUICK: Final = {"fflags": "nobuffer", "probesize": "32", "analyzeduration": "0"}
+_IN_PARTS: Final = ("rtsp", "rtsps")
+_QUICK: Final = {"probesize": "32", "analyzeduration": "0"}
+"""Without `nobuffer`: it drops what was probed, the first piece of the first key frame, and until the next one half of
+every picture is wrong, not marked as damaged."""
 
 
 class StreamRefused(SourceError):
@@ -78,8 +82,12 @@ class LiveStream:
             self._container.close()
             raise self._unreachable("it sends no pictures")
         self._stream = self._container.streams.video[0]
-        # By slices: all other threads add delay, or read pictures that come in several parts wrongly.
+        # By slices: threads by frame add a delay of several pictures.
         self._stream.thread_type = "SLICE"
+        if address.scheme in _IN_PARTS:
+            # A key frame of several slices comes in several packets. Without this each is taken for a whole picture:
+            # half of it is missing, and all that follow until the next key frame inherit that, not marked as damaged.
+            self._stream.codec_context.flags2 |= Flags2.chunks
 
     def __enter__(self) -> Self:
         return self

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
+from functools import cache, partial
 from pathlib import Path
 from typing import Final, Self
-from urllib.parse import quote, unquote, urlsplit
+from urllib.parse import quote, quote_plus, unquote, urlsplit
 
 from standoff.core.errors import SourceError
 
@@ -19,8 +20,12 @@ PROTOCOLS: Final = {
 }
 """By the scheme of an address: what libav may open for it. Nothing else: `file:` and `concat:` read this machine."""
 
-_CREDENTIALS = re.compile(r"(?<=://)[^/@\s]*@")
-_SECRETS = re.compile(r"(?i)\b(pass(?:word)?|pwd|token|key|secret|auth)=[^&\s]+")
+_CREDENTIALS = re.compile(r"(?<=://)\S*@")
+"""Up to the last @ of a word: a password may hold any sign, though it should not."""
+_SECRETS = re.compile(r"(?i)\b([\w-]*(?:pass(?:word|wd|phrase)?|pwd|token|key|secret|auth|sig(?:nature)?))=[^&\s]+")
+
+_ANY_BYTES: Final = "surrogateescape"
+"""A secret of the environment may be no UTF-8."""
 
 
 def masked(text: str, *secrets: str) -> str:
@@ -29,10 +34,36 @@ def masked(text: str, *secrets: str) -> str:
     >>> masked("cannot open rtsp://anna:p4ss@10.0.0.5/live?token=abc", "p4ss")
     'cannot open rtsp://***@10.0.0.5/live?token=***'
     """
-    for secret in filter(None, secrets):
-        for shape in (secret, quote(secret, safe="")):
-            text = text.replace(shape, "***")
+    if any(secrets):
+        text = _pattern_of(secrets).sub("***", text)
     return _SECRETS.sub(r"\1=***", _CREDENTIALS.sub("***@", text))
+
+
+@cache
+def _pattern_of(secrets: tuple[str, ...]) -> re.Pattern[str]:
+    """Return what finds secrets, as they are and as they stand in addresses; of two that overlap the longer one."""
+    encodings = (_encoded, partial(_encoded, safe="/"), partial(quote_plus, errors=_ANY_BYTES))
+    shapes = {shape for one in filter(None, secrets) for shape in (one, *(encode(one) for encode in encodings))}
+    return re.compile("|".join(re.escape(shape) for shape in sorted(shapes, key=len, reverse=True)))
+
+
+def _encoded(secret: str, safe: str = "") -> str:
+    return quote(secret, safe=safe, errors=_ANY_BYTES)
+
+
+def _shown(address: str) -> str:
+    """Return an address that is refused, for the message: all before its last @ may be credentials."""
+    before, sign, after = address.rpartition("@")
+    scheme, slashes, _ = before.partition("://")
+    begin = f"{scheme}{slashes}" if slashes and scheme in PROTOCOLS else ""
+    return masked(f"{begin}***@{after}" if sign else address)
+
+
+def _has_odd_signs(address: str, *, is_film: bool) -> bool:
+    """Return whether an address has signs that no address has; names of films may have more than others."""
+    if is_film:
+        return any(one == "\0" or "\ud800" <= one <= "\udfff" for one in address)
+    return any(one.isspace() or not one.isprintable() for one in address)
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,14 +98,10 @@ class LiveAddress:
             SourceError: Its scheme is none of `PROTOCOLS`, it has no host, or it holds a password.
         """
         scheme, _, rest = address.partition("://")
-        if (
-            scheme not in PROTOCOLS
-            or not rest
-            or (any(sign.isspace() for sign in address.strip()) and scheme != "replay")
-        ):
+        if scheme not in PROTOCOLS or not rest or _has_odd_signs(address, is_film=scheme == "replay"):
             raise SourceError(
                 expected=f"an address that begins with {', '.join(f'{one}://' for one in PROTOCOLS)}",
-                found=masked(address) or "nothing",
+                found=_shown(address) or "nothing",
                 fix="give the address of a stream, or of a film as replay://film.mp4",
             )
         if scheme == "replay":
@@ -85,11 +112,11 @@ class LiveAddress:
         except ValueError:
             host, parts = None, None
         if parts is None or not host:
-            raise SourceError(expected="a host in the address", found=masked(address), fix="write rtsp://host/path")
+            raise SourceError(expected="a host in the address", found=_shown(address), fix="write rtsp://host/path")
         if parts.username is not None or parts.password is not None:
             raise SourceError(
                 expected="an address without credentials",
-                found=masked(address),
+                found=_shown(address),
                 fix="write `user:` and `password: env:NAME` beside the address, so that they are shown nowhere",
             )
         return cls(scheme, address, user, password, ca_file)
@@ -106,7 +133,7 @@ class LiveAddress:
         if not self.user:
             return self.address
         before, _, after = self.address.partition("://")
-        return f"{before}://{quote(self.user, safe='')}:{quote(self.password, safe='')}@{after}"
+        return f"{before}://{_encoded(self.user)}:{_encoded(self.password)}@{after}"
 
     def masked(self, text: str) -> str:
         """Return a text without this address's credentials."""
