@@ -75,7 +75,7 @@ test-live: $(READY)
 
 # One after another: they measure.
 soak: $(READY)
-	STANDOFF_KILLS=200 STANDOFF_SOAK_HOURS=$(or $(HOURS),2) $(BIN)/python -m pytest tests/service/live -s -m "soak or live" \
+	SOAK_KILLS=200 SOAK_HOURS=$(or $(HOURS),2) $(BIN)/python -m pytest tests/service/live -s -m "soak or live" \
 	  -k "soak or killed" -p no:xdist
 
 test-processors: $(READY)

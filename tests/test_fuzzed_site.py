@@ -6,6 +6,7 @@ import random
 from pathlib import Path
 
 import pytest
+from known_settings import know_settings
 from laws import seeds
 from mutations import damaged
 
@@ -29,6 +30,11 @@ streams:
 """
 LINES = [line + b"\n" for line in SITE.splitlines()]
 HIDDEN = "sesame-open"
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    know_settings(monkeypatch)
 
 
 def refusal(path: Path, content: bytes) -> str:

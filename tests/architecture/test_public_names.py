@@ -26,8 +26,10 @@ PUBLIC_NAMES = {
         "read_detections", "read_scene", "schema_of",
     },
     "standoff.config": {
-        "GroundSettings", "MarkerSettings", "ReferenceSettings", "Replacement", "STAGE_NAMES", "Settings",
-        "SiteSettings", "StreamSettings", "anchor_paths", "build_ground", "build_marker_observer",
+        "AlertSettings", "BrokerSettings", "CaptureSettings", "GroundSettings", "LiveSettings", "MarkerSettings",
+        "NotifySettings", "ReceiverSettings", "ReferenceSettings", "Replacement", "STAGE_NAMES", "Secret", "Settings",
+        "ShiftSettings", "SiteSettings", "StreamSettings", "anchor_paths", "broker_settings", "build_ground",
+        "build_marker_observer", "is_site", "read_secret",
         "build_replacement", "build_stage",
         "build_watcher", "build_zones", "import_factory", "load_settings", "load_site", "named_files", "read_params",
         "read_settings_file", "recorded_settings", "resolved", "settings_from",
@@ -48,6 +50,11 @@ PUBLIC_NAMES = {
         "LabelledData", "LabelledPicture", "Problem", "ProposedPicture", "SPLITS", "Split", "load_picture",
         "read_data", "to_site_classes", "write_coco", "write_label_studio",
     },
+    "standoff.messages": {
+        "Acknowledgement", "Alert", "CONTENT_TYPE", "DevicePosition", "DeviceTopics", "EVENT_TYPES", "Echo",
+        "HazardNews", "HealthNews", "Heartbeat", "Supervision", "Timing", "Topics", "Unreadable", "WatchedZone",
+        "event_text", "read_event", "read_message",
+    },
     "standoff.monitor": {
         "ABOUT", "FanOut", "LiveQueue", "Monitor", "QueueState", "RecordKeeper", "Run", "RunRecord", "build_monitor",
         "open_run", "warnings_of",
@@ -58,6 +65,9 @@ PUBLIC_NAMES = {
     },
     "standoff.schemas": {"SCHEMAS"},
     "standoff.service.review": {"ReviewPage", "open_review", "review_app", "serve_review"},
+    "standoff.service.latency": {"clock_picture", "measure_latency", "read_clock"},
+    "standoff.service.status": {"Overview", "run", "status_app"},
+    "standoff.service.wearable": {"DeviceClock", "LANGUAGES", "Level", "Phrases", "Receiver", "Shown", "Signal"},
     "standoff.service.setup": {"Draft", "SetupPage", "open_setup", "serve_setup", "setup_app"},
     "standoff.stages.detect": {
         "BOXES_OUTPUT", "CLASS_INPUT", "CROPS_INPUT", "Candidates", "DetectParams", "Letterbox", "ModelCard",
@@ -67,8 +77,9 @@ PUBLIC_NAMES = {
         "open_session", "point_crop", "point_metadata", "point_squares_px", "resize",
     },
     "standoff.stages.frames": {
-        "ArrayPicture", "AvPicture", "FileSource", "Scaler", "SourceParams", "frame_from_array", "local_path",
-        "open_source",
+        "ArrayPicture", "AvPicture", "FileSource", "LiveAddress", "LivePicture", "LiveStream", "PROFESSIONAL_ERRORS",
+        "PROTOCOLS", "Scaler", "SourceParams", "StreamRefused", "StreamUnreachable", "frame_from_array", "local_path",
+        "masked", "open_source", "telemetry_of",
     },
     "standoff.stages.ground": {
         "Belief", "BoardView", "CalibrationResult", "Edges", "FixedCamera", "FusedGround", "FusedParams",

@@ -119,6 +119,15 @@ def test_a_clock_without_its_time_is_refused() -> None:
         read_event(json.dumps(event).encode(), Supervision)
 
 
+@pytest.mark.parametrize("name", ["sentms", "remainingms", "agems"])
+@pytest.mark.parametrize("number", ["1e999", "-1e999", "NaN", "Infinity", "true", '"5"'])
+def test_nothing_is_sent_at_no_time_or_holds_for_ever(name: str, number: str) -> None:
+    event = json.loads(text_of(SUPERVISION))
+    payload = json.dumps({**event, name: "HERE"}).replace('"HERE"', number)
+    with pytest.raises(Unreadable):
+        read_event(payload.encode(), Supervision)
+
+
 @pytest.mark.parametrize("told", [{"x_m": 1.0, "y_m": 2.0}, {"longitude_deg": 8.5, "latitude_deg": 50.1}])
 def test_a_device_says_where_it_is_in_one_of_two_ways(told: dict[str, float]) -> None:
     position = read_message(json.dumps({"sigma_m": 0.5, "age_ms": 20, **told}).encode(), DevicePosition)

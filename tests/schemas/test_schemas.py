@@ -77,7 +77,8 @@ def test_every_schema_is_one(name: str) -> None:
 
 def test_every_file_of_a_run_that_programs_read_has_a_schema() -> None:
     for_people = {OUTPUTS["video"], OUTPUTS["report"]}
-    described = {schema()["title"].partition(",")[0] for schema in SCHEMAS.values()}
+    titles = [schema()["title"] for schema in SCHEMAS.values()]
+    described = {title.partition(",")[0] for title in titles if not title.endswith("one message")}
     assert described == {*RUN_FILES, REVIEW_FILE} - for_people
 
 

@@ -62,6 +62,7 @@ def _documented(kind: type) -> dict[str, Any]:
 
 def _describe(schema: dict[str, Any], kind: type) -> None:
     meanings = attribute_meanings(kind)
+    schema.pop("title", None)
     schema["description"] = (kind.__doc__ or "").partition("\n")[0]
     for name, part in schema["properties"].items():
         part.pop("title", None)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import os
 import sys
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
@@ -14,15 +16,21 @@ from service.live.feed import Camera
 from service.live.running import Service, service, site_settings, with_work
 from service.live.servers import RtspServer, Server, mosquitto, rtsp_server
 
+from standoff.core.types import ImageArray
+
 Place = tuple[float, float]
 FAR_M: Place = (22.0, 6.0)
 NEAR_M: Place = (4.0, 0.0)
 MACHINE_M: Place = (0.0, 0.0)
+_DRIVEN_M, _DRIVEN_S = 2.0, 10.0
 
 
 def told(figure: str) -> None:
-    """Say a figure; `pytest -s` shows it."""
+    """Say a figure; `pytest -s` shows it, and the file that FIGURES names keeps it."""
     sys.stdout.write(f"{figure}\n")
+    if os.environ.get("FIGURES"):
+        with Path(os.environ["FIGURES"]).open("a", encoding="utf-8") as file:
+            file.write(f"{figure}\n")
 
 
 @dataclass
@@ -37,6 +45,7 @@ class Scene:
         run: The service.
         worker_m: Where the worker is; None: nowhere. Tests let him walk.
         machine_m: Where the machine is.
+        drives: Whether the machine goes to and fro: one that has stood for a minute counts as parked.
     """
 
     drawn: DrawnSite
@@ -45,7 +54,14 @@ class Scene:
     broker: Server
     run: Service
     worker_m: Place | None = FAR_M
-    machine_m: Place | None = MACHINE_M
+    machine_m: Place = MACHINE_M
+    drives: bool = False
+
+    def picture(self, time_s: float) -> ImageArray:
+        """Return what the camera sees at a moment."""
+        x_m, y_m = self.machine_m
+        machine_m = (x_m, y_m + _DRIVEN_M * math.sin(2.0 * math.pi * time_s / _DRIVEN_S)) if self.drives else (x_m, y_m)
+        return self.drawn.picture(self.worker_m, machine_m)
 
 
 @contextmanager
@@ -66,9 +82,8 @@ def scene(
     drawn = DrawnSite(size_px)
     made: list[Scene] = []
 
-    def draw(_time_s: float) -> Any:
-        one = made[0] if made else None
-        return drawn.picture(FAR_M if one is None else one.worker_m, MACHINE_M if one is None else one.machine_m)
+    def draw(time_s: float) -> ImageArray:
+        return made[0].picture(time_s) if made else drawn.picture(FAR_M, MACHINE_M)
 
     with (
         mosquitto(folder) as broker,

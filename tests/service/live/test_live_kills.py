@@ -7,6 +7,7 @@ import random
 import signal
 import time
 from collections import Counter
+from functools import partial
 from pathlib import Path
 from statistics import median
 
@@ -22,7 +23,7 @@ pytestmark = pytest.mark.live
 PROCESSES = ("capture-gate", "analysis", "messenger")
 BACK_WITHIN_S = 5.0
 RAISED = "SELECT json_extract(body, '$.hazard_id') FROM news WHERE kind = 'hazard'"
-KILLS = int(os.environ.get("STANDOFF_KILLS", "10"))
+KILLS = int(os.environ.get("SOAK_KILLS", "10"))
 """`make soak` asks for 200."""
 
 
@@ -46,18 +47,18 @@ def walk(one: Scene, rng: random.Random) -> None:
 def test_whoever_is_killed_no_open_hazard_is_lost_and_none_is_told_twice(seed: int, tmp_path: Path) -> None:
     rng, away_s = random.Random(seed), []
     with scene(tmp_path) as one, Wearable("foreman", one.broker.port) as foreman:
+        one.drives = True
         for number in range(KILLS):
             walk(one, rng)
             time.sleep(rng.uniform(0.5, 4.0))
             process = PROCESSES[number % len(PROCESSES)]
-            pid = until(lambda process=process: one.run.pid(process), 10.0, process)
+            pid = until(partial(one.run.pid, process), 10.0, process)
             words = one.run.stream()
             os.kill(pid, signal.SIGKILL)
             killed_s = time.monotonic()
+            frames_of = {words["session"]: words["frames"]}
             until(
-                lambda killed_s=killed_s, words=words: is_back(one, killed_s, {words["session"]: words["frames"]}),
-                30.0,
-                f"{process} again: {one.run.log.read_text()[-1500:]}",
+                partial(is_back, one, killed_s, frames_of), 30.0, f"{process} again: {one.run.log.read_text()[-1500:]}"
             )
             away_s.append((time.monotonic() - killed_s, process))
         one.worker_m = FAR_M

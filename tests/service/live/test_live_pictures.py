@@ -45,7 +45,7 @@ def numbers_in(gray: ImageArray) -> set[int]:
 
 @pytest.mark.parametrize("slices", [1, 2, 4])
 def test_all_parts_of_a_picture_are_of_the_same_moment_and_none_comes_twice(slices: int, tmp_path: Path) -> None:
-    drawn, seen = Numbered(), []
+    drawn, seen = Numbered(), list[int]()
     with (
         rtsp_server(tmp_path) as sender,
         Camera(drawn.draw, sender.write, size_px=SIZE_PX, slices=slices),

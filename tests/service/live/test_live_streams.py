@@ -8,6 +8,7 @@ import threading
 import time
 from collections.abc import Generator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -149,8 +150,8 @@ def test_a_stream_that_is_disabled_says_so_and_comes_back(tmp_path: Path) -> Non
             settings["streams"]["gate"]["enabled"] = enabled
             one.run.path.write_text(yaml.safe_dump(settings))
             assert reload(one.run).returncode == 0
-            until(lambda state=state: one.run.stream().get("state") == state, 20.0, state)
-        assert (one.run.pid("capture-gate") is not None) is True
+            until(partial(is_in, one.run, state), 20.0, state)
+        assert one.run.pid("capture-gate") is not None
 
 
 def test_alarms_that_are_set_aside_are_recorded_and_told_to_nobody(tmp_path: Path) -> None:
@@ -191,6 +192,10 @@ def test_a_second_service_on_the_same_state_is_refused_and_a_killed_one_leaves_n
         one.run.until_live()
         assert one.run.stop() == 0
         assert not one.run.state.joinpath("service.json").exists()
+
+
+def is_in(run: Service, state: str) -> bool:
+    return bool(run.stream().get("state") == state)
 
 
 def reload(run: Service) -> subprocess.CompletedProcess[str]:

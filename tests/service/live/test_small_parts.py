@@ -1,4 +1,4 @@
-"""Alarms that are set aside from a terminal, what Home Assistant is told, and what no log line says."""
+"""Alarms that are set aside, what Home Assistant is told, what no log line says, and what always fits into a word."""
 
 from __future__ import annotations
 
@@ -10,22 +10,31 @@ import pytest
 import yaml
 from hypothesis import given
 from hypothesis import strategies as st
+from known_settings import know_settings
 from service.live.made_news import hazard
 
 from standoff.config import SiteSettings, load_site
 from standoff.core.errors import ConfigError
 from standoff.messages import Topics
+from standoff.service.live.capture import Capture, CapturePlan
 from standoff.service.live.home_assistant import discovery
 from standoff.service.live.log import _masking
 from standoff.service.live.outbox import Outbox
 from standoff.service.live.service_clock import ServiceClock
 from standoff.service.live.shelving import set_aside, take_back_shelf
+from standoff.service.live.workplace import Workplace
+from standoff.stages.frames import LiveAddress
 
 SITE = {
     "site": "yard",
     "streams": {"gate": {"address": "rtsp://10.0.0.5/live"}, "crane": {"address": "rtsp://10.0.0.6/live"}},
     "receivers": {"wrist": {"wearer": "worker"}},
 }
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    know_settings(monkeypatch)
 
 
 @pytest.fixture
@@ -75,6 +84,25 @@ def test_home_assistant_finds_every_stream_and_every_receiver_where_they_speak(s
     }  # fmt: skip
     assert len({one["unique_id"] for one in found.values()}) == 3
     assert {one["availability_topic"] for one in found.values()} == {topics.service}
+
+
+@pytest.mark.parametrize("letter", ["x", "ü", "🚧", '"', "\n"])
+def test_whatever_libav_says_a_capture_can_pass_it_on(tmp_path: Path, letter: str) -> None:
+    workplace = Workplace(tmp_path)
+    capture = Capture(CapturePlan("gate", LiveAddress.read("rtsp://10.0.0.5/live")), workplace)
+    capture._say("refused", letter * 5000)
+    said = workplace.capture_record("gate").read()
+    assert said is not None and said["phase"] == "refused" and set(said["reason"]) == {letter}
+
+
+def test_what_a_large_site_has_to_say_fits_into_a_record(tmp_path: Path) -> None:
+    workplace = Workplace(tmp_path)
+    device = {"supervised": False, "reason": "x" * 500, "streams": [f"stream-{k}" for k in range(10)]}
+    hazard_id = {"hazard_id": "01J" + "X" * 23, "rule": "proximity", "track_ids": [123456, 123457], "reason": "x" * 200}
+    track = {"id": 123456, "class": "roller_or_dozer", "xyxy_px": [1234.5] * 4}
+    workplace.record("messenger").write({"devices": {f"device-{k:060}": device for k in range(300)}})
+    workplace.stream_record("gate").write({"open": [hazard_id] * 300, "tracks": [track] * 500})
+    assert len((workplace.record("messenger").read() or {})["devices"]) == 300
 
 
 @given(st.text(min_size=4, max_size=20), st.text(max_size=20), st.text(max_size=20))

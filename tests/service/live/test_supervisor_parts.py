@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 import yaml
+from known_settings import know_settings
 
 from standoff.config import SiteSettings, load_site
 from standoff.core.errors import ConfigError
@@ -20,6 +21,11 @@ SITE: dict[str, Any] = {
     "streams": {"gate": {"address": "rtsp://10.0.0.5/live"}, "crane": {"address": "rtsp://10.0.0.6/live"}},
     "receivers": {"wrist": {"wearer": "worker"}},
 }
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    know_settings(monkeypatch)
 
 
 def site(folder: Path, **changes: Any) -> SiteSettings:

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 import pytest
 from fastapi.testclient import TestClient
+from known_settings import know_settings
 from prometheus_client.parser import text_string_to_metric_families
 from service.status.made_service import QUANTILES, MadeService, hazard
 
@@ -22,7 +23,8 @@ CONTRACT = Path(__file__).parents[3] / "page" / "status-api.json"
 
 
 @pytest.fixture
-def made(tmp_path: Path) -> MadeService:
+def made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> MadeService:
+    know_settings(monkeypatch)
     return MadeService(tmp_path)
 
 

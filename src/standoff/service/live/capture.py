@@ -29,6 +29,8 @@ STUCK_CODE: Final = 70
 _PLAUSIBLE_S: Final = 60.0
 _AHEAD_S: Final = 1.0
 _TOLD_LASTS_S: Final = 60.0
+_LONGEST_REASON: Final = 300
+"""Whatever its letters are, it fits into the record."""
 _SAMPLED: Final = 4
 """Every fourth pixel of every fourth row."""
 _CHANGED_LEVELS: Final = 8
@@ -118,7 +120,12 @@ class Capture:
         self._write()
 
     def _write(self) -> None:
-        words = {"phase": self._phase, "reason": self._reason[:500], "beat_s": time.monotonic(), "pid": os.getpid()}
+        words = {
+            "phase": self._phase,
+            "reason": self._reason[:_LONGEST_REASON],
+            "beat_s": time.monotonic(),
+            "pid": os.getpid(),
+        }
         self._record.write({**words, "connections": self._connections})
 
     def _beat(self) -> None:

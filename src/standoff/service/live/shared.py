@@ -24,7 +24,8 @@ from standoff.core.types import ImageArray
 _HEAD: Final = struct.Struct("<II")
 _TRIES: Final = 50
 _PAUSE_S: Final = 2e-4
-_RECORD_BYTES: Final = 1 << 16
+_RECORD_BYTES: Final = 1 << 18
+"""A few hundred devices, each with all reasons why nobody watches over it, are a good half of it."""
 _PICTURES: Final = 3
 """One that is read, one that is newest, one that is written."""
 _COUNT: Final = struct.Struct("<Q")
