@@ -6,13 +6,14 @@ at first: what was true then may not be true any more, and only the outbox knows
 
 from __future__ import annotations
 
+import contextlib
 import queue
 import ssl
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import paho.mqtt.client as mqtt
 from paho.mqtt.enums import CallbackAPIVersion, MQTTErrorCode
@@ -29,6 +30,9 @@ _LONGEST_PAUSE_S: Final = 1.0
 _MOST_IN_FLIGHT: Final = 100
 _MOST_QUEUED: Final = 1000
 _QOS: Final = 1
+
+
+Waiting = TypeVar("Waiting")
 
 
 @dataclass(frozen=True, slots=True)
@@ -282,6 +286,13 @@ class Broker:
         if client is self._client:
             self._sent.confirmed.add(mid)
             self._match(mid)
+
+
+def waiting_in(waiting: queue.SimpleQueue[Waiting]) -> Iterator[Waiting]:
+    """Yield what is there, and wait for nothing."""
+    with contextlib.suppress(queue.Empty):
+        while True:
+            yield waiting.get_nowait()
 
 
 class _Sent:

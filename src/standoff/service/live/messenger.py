@@ -8,10 +8,9 @@ import os
 import queue
 import signal
 import threading
-from collections import OrderedDict
-from collections.abc import Iterator
+from dataclasses import asdict
 from datetime import UTC, datetime
-from typing import Any, Final, TypeVar
+from typing import Any, Final
 
 from standoff.config import SiteSettings, site_origin
 from standoff.core.errors import StandoffError
@@ -21,7 +20,6 @@ from standoff.messages import (
     Acknowledgement,
     DevicePosition,
     Echo,
-    Heartbeat,
     Timing,
     Topics,
     Unreadable,
@@ -29,16 +27,17 @@ from standoff.messages import (
     read_message,
 )
 from standoff.service.live.alarms import Alarms
-from standoff.service.live.broker import Broker, Confirmed, Connected, Disconnected, LastWill, Received
+from standoff.service.live.broker import Broker, Confirmed, Connected, Disconnected, LastWill, Received, waiting_in
 from standoff.service.live.broker_access import broker_access
 from standoff.service.live.drone_word import osd_topic, read_osd
+from standoff.service.live.echoes import Echoes
+from standoff.service.live.heartbeat import heartbeat_of
 from standoff.service.live.home_assistant import discovery
 from standoff.service.live.letters import LetterWriter, sent_text
 from standoff.service.live.log import log_of
 from standoff.service.live.notifier import TOPIC as NOTIFY_TOPIC
 from standoff.service.live.notifier import Notifier, notifiers
 from standoff.service.live.outbox import Letter, Outbox
-from standoff.service.live.percentiles import Percentiles
 from standoff.service.live.recipients import Recipients
 from standoff.service.live.service_clock import Moment, ServiceClock
 from standoff.service.live.sighting import Sighting
@@ -51,10 +50,7 @@ _ROUTE_EVERY_S: Final = 0.5
 """Without a ring: one may get lost."""
 _WORDS_EVERY_S: Final = 0.5
 _PRUNE_EVERY_S: Final = 3600.0
-_MOST_ECHOES: Final = 5000
 _MOST_REFUSED_LOGGED: Final = 20
-
-Waiting = TypeVar("Waiting")
 
 
 class Messenger:
@@ -77,8 +73,7 @@ class Messenger:
         self._beaten: dict[str, tuple[str, int]] = {}
         self._sequences: dict[str, int] = {}
         self._in_flight: set[str] = set()
-        self._echoes: OrderedDict[str, tuple[float | None, float]] = OrderedDict()
-        self._to_wrist, self._to_broker = Percentiles(), Percentiles()
+        self._echoes = Echoes()
         self._is_connected, self._refused, self._expired = False, 0, 0
         self._is_ended, self._parent = False, os.getppid()
         self._supervised: dict[str, dict[str, Any]] = {}
@@ -145,8 +140,8 @@ class Messenger:
             while True:
                 is_rung |= self._take_words(words)
                 words = self._rung.get_nowait()
-        confirmed = [*_waiting_in(self._notified)]
-        for news in _waiting_in(self._broker.news):
+        confirmed = [*waiting_in(self._notified)]
+        for news in waiting_in(self._broker.news):
             if isinstance(news, Confirmed):
                 confirmed.append(news.token)
             else:
@@ -206,20 +201,9 @@ class Messenger:
             self._outbox.acknowledge(said.hazard_id, device, self._now())
             self._log.info("acknowledged", device=device, hazard=said.hazard_id)
         elif part == "echo":
-            self._take_echo(read_message(message.payload, Echo), message.at_s)
+            self._echoes.take(read_message(message.payload, Echo), message.at_s)
         else:
             raise Unreadable("no topic of a device")
-
-    def _take_echo(self, echo: Echo, at_s: float) -> None:
-        """Measure the way to the wrist: the way back is taken for half of the round that the message made."""
-        sent = self._echoes.pop(echo.id, None)
-        if sent is None:
-            return
-        captured_s, sent_s = sent
-        way_back_s = max(0.0, (at_s - sent_s - echo.held_ms / 1e3) / 2.0)
-        self._to_broker.add((at_s - sent_s - way_back_s) * 1e3)
-        if captured_s is not None:
-            self._to_wrist.add((at_s - way_back_s - captured_s) * 1e3)
 
     def _route(self) -> None:
         """Write the letters of all news that have none yet."""
@@ -311,9 +295,7 @@ class Messenger:
         )
         if is_taken:
             self._in_flight.add(letter.id)
-            self._echoes[letter.id] = (letter.captured_s, now.s)
-            while len(self._echoes) > _MOST_ECHOES:
-                self._echoes.popitem(last=False)
+            self._echoes.expect(letter.id, letter.captured_s, now.s)
         return is_taken
 
     def _notify(self, letter: Letter, now: Moment) -> None:
@@ -330,7 +312,7 @@ class Messenger:
                 continue
             self._beaten[stream] = frame
             sequence = self._sequences[stream] = self._sequences.get(stream, -1) + 1
-            beat = _heartbeat(sighting, self._site.live.site, sequence)
+            beat = heartbeat_of(sighting, self._site.live.site, sequence)
             self._send_beat(beat, self._topics.heartbeat(stream), f"{stream}-{sequence}", stream, sighting, now)
         self._recipients.match(now.s)
         for device in self._recipients.devices:
@@ -405,43 +387,13 @@ class Messenger:
                 "letters": self._outbox.counts(),
                 "expired": self._expired,
                 "refused": self._refused,
-                "to_wrist_ms": self._to_wrist.summary(),
-                "sent_to_shown_ms": self._to_broker.summary(),
+                "to_wrist_ms": self._echoes.to_wrist_ms.summary(),
+                "sent_to_shown_ms": self._echoes.to_device_ms.summary(),
                 "devices": self._supervised,
-                "shelves": [
-                    {"id": one.id, "stream": one.stream, "zone": one.zone, "hazard_id": one.hazard_id,
-                     "author": one.author, "reason": one.reason, "until_unix_s": one.until_unix_s}
-                    for one in self._outbox.shelves(now)
-                ],
+                "shelves": [asdict(one) for one in self._outbox.shelves(now)],
                 "notify_failures": sum(one.failures for one in self._notifiers),
             }
-        )  # fmt: skip
-
-
-def _waiting_in(waiting: queue.SimpleQueue[Waiting]) -> Iterator[Waiting]:
-    """Yield what is there, and wait for nothing."""
-    with contextlib.suppress(queue.Empty):
-        while True:
-            yield waiting.get_nowait()
-
-
-def _heartbeat(sighting: Sighting, site: str, sequence: int) -> Heartbeat:
-    share = sighting.watched.share
-    return Heartbeat(
-        site=site,
-        stream=sighting.stream,
-        session=sighting.session,
-        sequence=sequence,
-        frame=sighting.frame,
-        time_s=sighting.time_s,
-        measured=bool(sighting.ground),
-        reason="" if sighting.ground else getattr(sighting.ground, "reason", ""),
-        watched_share=None if math.isnan(share) else round(share, 3),
-        unwatched={reason: round(part, 3) for reason, part in sighting.watched.unwatched.items()},
-        zones=sighting.zones,
-        delay=sighting.delay,
-        open_hazards=sighting.open_hazards,
-    )
+        )
 
 
 def run(workplace: Workplace) -> None:

@@ -203,7 +203,7 @@ def _details(shown: Shown, phrases: Phrases, *, is_connected: bool) -> list[str]
             found.append(phrases.say("no_heartbeat", seconds=round(shown.silence_s)))
         return found
     hazard = shown.alert.hazard
-    found = [" + ".join(phrases.say(one) for one in hazard.classes)]
+    found = [" + ".join(phrases.say("somebody" if one == "unknown" else one) for one in hazard.classes)]
     if shown.level == "unknown":
         found.append(phrases.say("unknown_more", reason=hazard.reason))
     elif hazard.distance_m is not None and not hazard.zone:
