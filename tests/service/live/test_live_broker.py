@@ -131,13 +131,15 @@ def heard_ids(listener: Listener) -> list[str]:
 
 def test_what_is_left_of_a_message_is_computed_when_it_is_sent(tmp_path: Path) -> None:
     with mosquitto(tmp_path) as broker:
-        listener = Listener(broker.port, "standoff/#")
-        with messenger(tmp_path, broker.port) as (outbox, workplace):
-            broker.kill()
+        listener, cable = Listener(broker.port, "standoff/#"), Cable(broker.port)
+        until(lambda: listener.connections)
+        with messenger(tmp_path, cable.port) as (outbox, workplace):
+            cable.pull()
             raise_alert(outbox, workplace, 1)
             time.sleep(2.0)
-            broker.start()
+            cable.plug()
             (alert,) = until(lambda: listener.bodies("/alert"))
+        cable.pull()
         listener.close()
     assert 0.0 < alert["remainingms"] <= (VALID_S - 2.0) * 1e3
     assert 2000.0 < alert["agems"] < VALID_S * 1e3
