@@ -50,7 +50,6 @@ class Analysis:
         self._streams: dict[str, StreamAnalysis] = {}
         self._busy_since_s: float | None = None
         self._is_ended = False
-        self._parent = os.getppid()
         self._plan_stamp = workplace.plan_stamp()
         self._take(site)
 
@@ -155,7 +154,7 @@ class Analysis:
             busy_s = 0.0 if self._busy_since_s is None else time.monotonic() - self._busy_since_s
             with contextlib.suppress(ValueError):
                 self._word.write({"beat_s": time.monotonic(), "pid": os.getpid(), "busy_s": busy_s})
-            if os.getppid() != self._parent:
+            if not self._workplace.is_owned():
                 os._exit(0)
             time.sleep(_BEAT_S)
 

@@ -67,7 +67,6 @@ class Capture:
         self._reason, self._connections = "", 0
         self._progress_s = time.monotonic()
         self._rest_until_s = 0.0
-        self._parent = os.getppid()
 
     def run(self) -> None:
         """Go on until the process that started it is gone."""
@@ -133,7 +132,7 @@ class Capture:
         while True:
             time.sleep(BEAT_S)
             now_s = time.monotonic()
-            if os.getppid() != self._parent:
+            if not self._workplace.is_owned():
                 os._exit(0)
             if now_s - max(self._progress_s, self._rest_until_s) > _STUCK_S:
                 self._log.error("stuck; begins anew", phase=self._phase)

@@ -75,7 +75,7 @@ class Messenger:
         self._in_flight: set[str] = set()
         self._echoes = Echoes()
         self._is_connected, self._refused, self._expired = False, 0, 0
-        self._is_ended, self._parent = False, os.getppid()
+        self._is_ended = False
         self._supervised: dict[str, dict[str, Any]] = {}
         self._plan_stamp = workplace.plan_stamp()
         self._told_devices: dict[str, set[str]] = {}
@@ -129,7 +129,7 @@ class Messenger:
             words = self._bell.wait(HEARTBEAT_EVERY_S)
             if words is not None:
                 self._rung.put(words)
-            if os.getppid() != self._parent:
+            if not self._workplace.is_owned():
                 os._exit(0)
 
     def _hear(self) -> bool:

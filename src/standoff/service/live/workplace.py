@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 _MEMORY: Final = Path("/dev/shm")
 _PLAN: Final = "site.plan"
+_OWNER: Final = "owner"
 _SECRETS: Final = "secrets.plan"
 _LARGEST_RING: Final = 1 << 17
 
@@ -40,7 +41,16 @@ class Workplace:
     def make(cls) -> Workplace:
         """Make a new one."""
         parent = _MEMORY if os.access(_MEMORY, os.W_OK) else None
-        return cls(Path(tempfile.mkdtemp(prefix="standoff-", dir=parent)))
+        made = cls(Path(tempfile.mkdtemp(prefix="standoff-", dir=parent)))
+        (made.folder / _OWNER).write_text(str(os.getpid()), encoding="ascii")
+        return made
+
+    def is_owned(self) -> bool:
+        """Return whether who made it is still there, as the parent of who asks: whoever is left alone has to end."""
+        try:
+            return os.getppid() == int((self.folder / _OWNER).read_text(encoding="ascii"))
+        except (OSError, ValueError):
+            return False
 
     def remove(self) -> None:
         """Take it away, with all that is in it."""

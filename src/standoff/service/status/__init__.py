@@ -51,11 +51,11 @@ def run(workplace: Workplace) -> None:
 
 
 def _beat(workplace: Workplace, address: str) -> None:
-    record, parent = workplace.record("page"), os.getppid()
+    record = workplace.record("page")
     while True:
         with suppress(ValueError):
             record.write({"beat_s": time.monotonic(), "pid": os.getpid(), "address": address})
-        if os.getppid() != parent:
+        if not workplace.is_owned():
             os._exit(0)
         time.sleep(_BEAT_S)
 
