@@ -270,8 +270,8 @@ class Messenger:
                 continue
             if letter.topic.startswith(NOTIFY_TOPIC):
                 self._notify(letter, now)
-            elif not self._is_connected or not self._send_letter(letter, now):
-                continue
+            elif self._is_connected:
+                self._send_letter(letter, now)
 
     def _send_now(self, letters: list[Letter]) -> None:
         """Send letters that are not in the outbox yet, alerts first; what the broker does not take waits there."""
@@ -282,7 +282,7 @@ class Messenger:
             if not letter.topic.startswith(NOTIFY_TOPIC) and letter.remaining_s(now) > 0.0:
                 self._send_letter(letter, now)
 
-    def _send_letter(self, letter: Letter, now: Moment) -> bool:
+    def _send_letter(self, letter: Letter, now: Moment) -> None:
         payload, timing = sent_text(letter, now)
         expiry_s = None if math.isinf(letter.valid_s) else timing.remaining_ms / 1e3
         is_taken = self._broker.send(
@@ -296,7 +296,6 @@ class Messenger:
         if is_taken:
             self._in_flight.add(letter.id)
             self._echoes.expect(letter.id, letter.captured_s, now.s)
-        return is_taken
 
     def _notify(self, letter: Letter, now: Moment) -> None:
         number = int(letter.topic.removeprefix(NOTIFY_TOPIC))

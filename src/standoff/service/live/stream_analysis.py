@@ -107,11 +107,6 @@ class StreamAnalysis:
         self._outbox.leave_unknown(name, _BEGUN_ANEW, now())
         self.check(time.monotonic())
 
-    @property
-    def condition(self) -> StreamCondition:
-        """Its state as last looked at."""
-        return self._condition
-
     def has_news(self) -> bool:
         """Return whether a picture waits that nobody has looked at, of a stream that shows what is now."""
         about = self._slot.about()

@@ -8,7 +8,6 @@ from typing import Final
 from standoff.messages import Timing
 
 _KEPT: Final = 120
-_FEW: Final = 1
 
 
 class DeviceClock:
@@ -49,7 +48,7 @@ class DeviceClock:
         >>> clock.remaining_ms(Timing("b", 2000.0, 5000.0, None), 2501.0) is None
         True
         """
-        if timing.clock != self._clock or len(self._offsets_ms) < _FEW:
+        if timing.clock != self._clock or not self._offsets_ms:
             return None
         late_ms = now_ms - timing.sent_ms - min(self._offsets_ms)
         return timing.remaining_ms - max(late_ms, 0.0)
