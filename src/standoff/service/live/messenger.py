@@ -51,6 +51,8 @@ _ROUTE_EVERY_S: Final = 0.5
 _WORDS_EVERY_S: Final = 0.5
 _PRUNE_EVERY_S: Final = 3600.0
 _MOST_REFUSED_LOGGED: Final = 20
+_ON_THE_WAY_S: Final = 0.1
+"""What holds for less than this would come when it is true no more."""
 
 
 class Messenger:
@@ -259,7 +261,7 @@ class Messenger:
     def _send(self, now: Moment) -> None:
         """Send what waits and is true; what is true no more dies here."""
         waiting = [letter for letter in self._outbox.waiting() if letter.id not in self._in_flight]
-        dead = [letter.id for letter in waiting if letter.remaining_s(now) <= 0.0]
+        dead = [letter.id for letter in waiting if letter.remaining_s(now) <= _ON_THE_WAY_S]
         if dead:
             self._outbox.expired(dead, now)
             self._expired += len(dead)
@@ -279,7 +281,7 @@ class Messenger:
             return
         now = self._now()
         for letter in sorted(letters, key=lambda one: "/alert" not in one.topic):
-            if not letter.topic.startswith(NOTIFY_TOPIC) and letter.remaining_s(now) > 0.0:
+            if not letter.topic.startswith(NOTIFY_TOPIC) and letter.remaining_s(now) > _ON_THE_WAY_S:
                 self._send_letter(letter, now)
 
     def _send_letter(self, letter: Letter, now: Moment) -> None:
