@@ -28,7 +28,7 @@ NUMBERS = ("watched_s", "mapped_share", "ground_share", "worker_hours", "alarms"
 
 @pytest.fixture
 def one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    def watch(plans: Sequence[FilmPlan], address: str | None, *, cores_per_film: int) -> Iterator[FilmResult]:
+    def watch(plans: Sequence[FilmPlan], address: str | None, *, cores_per_film: int, **_: Any) -> Iterator[FilmResult]:
         yield from (plan.watch(cores_per_film) for plan in plans)
 
     monkeypatch.setattr("standoff.scale.watch_films", watch)

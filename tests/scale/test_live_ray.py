@@ -10,6 +10,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
@@ -21,6 +22,8 @@ from cli.conftest import write_site
 from cli.test_cli import make_video
 from cli.test_replay import TABLES, assert_same, monitor
 from scale.conftest import FILMS
+from scale.noted_detectors import looks
+from scale.test_part import noted
 
 PROJECT = Path(__file__).resolve().parents[2]
 PATHS = os.pathsep.join(str(PROJECT / part) for part in ("src", "simulator/src", "tests"))
@@ -67,6 +70,23 @@ def test_results_of_a_batch_are_those_of_run_and_what_is_finished_is_skipped(fil
     code, results, err = batch(films, site)
     assert (code, err, outcomes(results)) == (0, "", ALL_COMPLETE)
     assert [(tmp_path / "out" / name / "run.json").read_bytes() for name in FILMS] == records
+
+
+def test_long_films_are_looked_at_in_parts_and_are_the_runs_in_one_piece(films: Path, tmp_path: Path) -> None:
+    words = tmp_path / "words"
+    # Frame 13 is in a part of each film; one process dies there, and what it had not written down is looked at again.
+    site = write_site(tmp_path, outputs=[*TABLES, "hazards"], replace=noted(words, dies_at=[13]))
+    code, results, err = batch(films, site, "--cores-per-film", 1, "--part-minutes", 0.01)
+    assert (code, err, outcomes(results)) == (0, "", ALL_COMPLETE)
+    seen = Counter(looks(words))
+    wanted = Counter(index for frames in FILMS.values() for index in range(frames))
+    assert seen.keys() == wanted.keys()
+    assert seen[13] == wanted[13] + 1
+    assert all(wanted[index] <= count <= wanted[index] + 1 for index, count in seen.items())
+    for name in FILMS:
+        record = json.loads((tmp_path / "out" / name / "run.json").read_text())
+        assert record["model"]["remembered_frames"] == FILMS[name]
+        assert_same(tmp_path / "out" / name, monitor(films / f"{name}.mp4", site, tmp_path / name))
 
 
 def test_the_film_of_a_killed_process_is_run_again(films: Path, tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ import ray.exceptions
 
 from standoff.config import Settings
 from standoff.core.errors import ConfigError
-from standoff.scale import FilmPlan, FilmResult, pool, watch_films
+from standoff.scale import FilmPart, FilmPlan, FilmResult, pool, watch_films
 
 Act = Callable[[FilmPlan], FilmResult]
 ERRORS: Any = ray.exceptions
@@ -127,3 +127,72 @@ def test_a_port_at_which_nobody_speaks_rays_language_is_given_up_in_time(monkeyp
         with pytest.raises(ConfigError, match="expected a Ray cluster at ray"):
             next(iter(watch_films([], f"ray://127.0.0.1:{silent.getsockname()[1]}")))
         assert time.monotonic() - begun_s < 3.0
+
+
+def in_parts(plan: FilmPlan, part_s: float) -> list[FilmPart]:
+    count = {"1": 5, "3": 2}.get(plan.film.stem, 0)
+    return [Part(plan, number * part_s, None, 0, count) for number in range(count)]
+
+
+class Part(FilmPart):
+    """A part that can be a key."""
+
+    def __hash__(self) -> int:
+        return hash((self.plan.film, self.start_s))
+
+
+@dataclass
+class ScriptedParts(ScriptedRay):
+    """A Ray that writes down what is done in which order; the parts of one film kill their processes.
+
+    Args:
+        deadly: Its name.
+    """
+
+    deadly: str = ""
+    done: list[tuple[str, float | None]] = field(default_factory=list)
+
+    def get(self, work: Any) -> Any:
+        if isinstance(work, FilmPlan):
+            self.done.append((work.film.stem, None))
+            return super().get(work)
+        self.done.append((work.plan.film.stem, work.start_s))
+        if work.plan.film.stem == self.deadly:
+            raise ERRORS.WorkerCrashedError
+        return ""
+
+
+@pytest.mark.parametrize("deadly", ["", "1", "3"])
+def test_a_long_film_is_watched_once_all_its_parts_were_looked_at_or_given_up(
+    monkeypatch: pytest.MonkeyPatch, deadly: str
+) -> None:
+    monkeypatch.setattr(pool, "parts_of", in_parts)
+    told: list[FilmPart] = []
+    scripted = ScriptedParts(cores=(2, 2), deadly=deadly)
+    results = pool.Machines(scripted, 2, part_s=10.0, on_part=told.append).watch(plans(5))
+    assert sorted(one.film.stem for one in results if one.status == "complete") == ["0", "1", "2", "3", "4"]
+    for film, count in (("1", 5), ("3", 2)):
+        order = [start_s for name, start_s in scripted.done if name == film]
+        assert order[-1] is None and order.count(None) == 1
+        tries = 4 if film == deadly else 1
+        assert {order.count(10.0 * number) for number in range(count)} == {tries}
+        assert sum(part.plan.film.stem == film for part in told) == count
+    assert scripted.most_waiting == 4
+
+
+def test_one_place_looks_at_no_film_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pool, "parts_of", in_parts)
+    scripted = ScriptedParts(cores=(2,))
+    assert len(list(pool.Machines(scripted, 2, part_s=10.0).watch(plans(5)))) == 5
+    assert all(start_s is None for _, start_s in scripted.done)
+
+
+def test_parts_left_without_a_machine_end_as_failed_films(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pool, "parts_of", in_parts)
+    monkeypatch.setattr(pool, "_NO_MACHINE_S", 0.0)
+    monkeypatch.setattr(pool, "_LOOKS_EVERY_S", 0.0)
+    scripted = ScriptedParts(cores=(2, 2))
+    results = pool.Machines(scripted, 2, part_s=10.0).watch(plans(5))
+    assert next(results).status == "complete"
+    scripted.cores = ()
+    assert sorted((one.film.stem, one.status) for one in results) == [(str(k), "failed") for k in (1, 2, 3, 4)]

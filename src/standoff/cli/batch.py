@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import math
 import signal
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from time import monotonic
+from typing import TYPE_CHECKING, Annotated, Self
 
 import typer
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from standoff.scale import FilmPlan, FilmResult
+    from standoff.scale import FilmPart, FilmPlan, FilmResult
 
 
 def batch(
@@ -25,6 +27,10 @@ def batch(
         str | None, typer.Option(help="Of a Ray cluster whose machines see the same files: ray://HOST[:PORT].")
     ] = None,
     cores_per_film: Annotated[int, typer.Option(min=1, help="Cores that one film may keep busy.")] = 2,
+    part_minutes: Annotated[
+        float,
+        typer.Option(min=0.0, help="Long films are looked at in parts of about this length, side by side; 0: never."),
+    ] = 10.0,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Watch films again that were watched with other settings.")
     ] = False,
@@ -41,7 +47,7 @@ def batch(
     settings = load_settings(config, detector_overrides(model, None))
     plans = plan_films(find_films(films), out, settings, overwrites=overwrite)
     make_folder(out)
-    results = sorted(_watched(plans, address, cores_per_film, quiet=quiet), key=lambda one: one.film.name)
+    results = sorted(_watched(plans, address, cores_per_film, part_minutes, quiet=quiet), key=lambda one: one.film.name)
     write_tables(results, out)
     write_moments(results, out / "moments.geojson", settings)
     write_overview(results, out / "overview.html", settings.show.unit)
@@ -52,26 +58,67 @@ def batch(
     raise typer.Exit(int(any(result.status != "complete" for result in results)))
 
 
-def _watched(plans: Sequence[FilmPlan], address: str | None, cores_per_film: int, *, quiet: bool) -> list[FilmResult]:
+def _watched(
+    plans: Sequence[FilmPlan], address: str | None, cores_per_film: int, part_minutes: float, *, quiet: bool
+) -> list[FilmResult]:
     """Watch the films with a progress bar; a film that fails is told at once."""
-    from standoff.cli.console import progress
     from standoff.scale import watch_films
 
     # A request to terminate ends all processes, as Ctrl-C does.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     results: list[FilmResult] = []
+    part_s = 60.0 * part_minutes or math.inf
     try:
-        with progress("watching", len(plans), quiet=quiet, unit="films") as on_film:
-            for result in watch_films(plans, address, cores_per_film=cores_per_film):
+        with _Steps(len(plans), quiet=quiet) as steps:
+            for result in watch_films(
+                plans, address, cores_per_film=cores_per_film, part_s=part_s, on_part=steps.take_part
+            ):
                 results.append(result)
                 if result.status != "complete":
                     typer.echo(f"standoff: {result.film.name}: {result.message}", err=True)
-                on_film()
+                steps.take()
     except KeyboardInterrupt:
         words = f"{len(results)} of {len(plans)} films are done; the same command goes on with the others."
         typer.echo(f"standoff: interrupted; {words}", err=True)
         raise typer.Exit(1) from None
     return results
+
+
+class _Steps:
+    """A progress bar of films and of the parts of long ones, of which nobody knows how many there are before they come.
+
+    Args:
+        films: How many there are.
+        quiet: No progress bar.
+    """
+
+    def __init__(self, films: int, *, quiet: bool) -> None:
+        from standoff.cli.console import progress_bar
+
+        self._bar = progress_bar(quiet=quiet, unit="films and parts")
+        self._total, self._done, self._begun_s = films, 0, monotonic()
+        self._divided = set[Path]()
+        self._task = self._bar.add_task("watching", total=films, rate=0.0)
+
+    def __enter__(self) -> Self:
+        self._bar.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._bar.stop()
+
+    def take(self) -> None:
+        """Take that one is done."""
+        self._done += 1
+        rate = self._done / (monotonic() - self._begun_s)
+        self._bar.update(self._task, completed=self._done, total=self._total, rate=rate)
+
+    def take_part(self, part: FilmPart) -> None:
+        """Take that a part of a film is done, which with all others comes before the film."""
+        if part.plan.out not in self._divided:
+            self._divided.add(part.plan.out)
+            self._total += part.count
+        self.take()
 
 
 def _tell(results: Sequence[FilmResult], overview: Path) -> None:

@@ -82,6 +82,10 @@ def run(
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace an earlier run's files in the folder.")
     ] = False,
+    resume: Annotated[
+        bool,
+        typer.Option("--resume", help="Go on with a run in the folder that was cut short, of the same film."),
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the run's record as JSON.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
 ) -> None:
@@ -89,7 +93,8 @@ def run(
     from standoff.cli.ground_option import GroundOption
     from standoff.config import load_settings
     from standoff.core.lengths import UNITS
-    from standoff.monitor import open_run
+    from standoff.monitor import check_resumable, open_run
+    from standoff.stages.frames import local_path
 
     overrides = _stated(
         source=_stated(telemetry=telemetry, start_s=start, stop_s=stop, every=every, fps=fps) or None,
@@ -103,7 +108,9 @@ def run(
     overrides |= _stated(ground=of_ground.settings or None)
     settings = load_settings(config, overrides)
     of_ground.check_units(settings.show.unit)
-    opened = open_run(source, out, settings, overwrite=overwrite)
+    if resume:
+        check_resumable(local_path(source), out, settings)
+    opened = open_run(source, out, settings, overwrite=overwrite or resume, resume=resume)
     _run_with_warnings(opened, UNITS[settings.show.unit].said, as_json=as_json, quiet=quiet)
     raise typer.Exit(exit_status(opened))
 

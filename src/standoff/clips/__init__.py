@@ -42,6 +42,7 @@ from standoff.clips.detections import (
     read_detections,
 )
 from standoff.clips.ground_maps import MAP_COLUMNS, map_of, map_values
+from standoff.clips.looks import KeptLooks, part_path
 from standoff.clips.run_folder import RunFolder, RunTable
 
 __all__ = [
@@ -74,6 +75,7 @@ __all__ = [
     "Clip",
     "Column",
     "Columns",
+    "KeptLooks",
     "RecordedDetections",
     "RunFolder",
     "RunTable",
@@ -86,6 +88,7 @@ __all__ = [
     "map_of",
     "map_values",
     "metadata_of",
+    "part_path",
     "read_clip_table",
     "read_columns",
     "read_detections",

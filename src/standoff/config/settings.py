@@ -246,7 +246,7 @@ class Settings(BaseSettings):
 
     @model_validator(mode="after")
     def _refuse_taken_names(self) -> Settings:
-        taken = sorted(self.extra_outputs.keys() & {*OUTPUTS, "record"})
+        taken = sorted(self.extra_outputs.keys() & {*OUTPUTS, "looks", "record"})
         if taken:
             raise ValueError(f"extra_outputs: {', '.join(taken)} is the name of an output of standoff's own")
         return self

@@ -15,6 +15,9 @@ ASSISTANCE: Final = "Assistance only: no certified safety function, no replaceme
 ZONES_FILE: Final = "zones.geojson"
 """The zones of the site, in its frame, where there are any."""
 
+LOOKS_FOLDER: Final = "looks.parts"
+"""What the detector saw so far, while a run goes on and after one that was cut short; gone when a run is complete."""
+
 OUTPUTS: Final[Mapping[str, str]] = MappingProxyType(
     {
         "tracks": "tracks.parquet",

@@ -7,7 +7,7 @@ picture size, and has nothing to forget. `missing_of` tells what another class l
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Final, Protocol, runtime_checkable
 
 from standoff.core.homography import BoolArray
 from standoff.core.types import (
@@ -29,6 +29,10 @@ from standoff.core.types import (
 
 AnyGround = GroundMap | NoGroundMap
 AnyMotion = CameraMotion | NoCameraMotion
+
+EACH_ALONE: Final = "each_frame_alone"
+"""In a detector's description, where it is true: what it sees in a frame depends on that frame and on nothing before
+it. Only then may frames be looked at in another order, on another machine, or not again after a power cut."""
 
 _NOTHING: Mapping[str, Any] = {}
 

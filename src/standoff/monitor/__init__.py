@@ -13,6 +13,7 @@ from standoff.monitor.monitor import Monitor
 from standoff.monitor.opening import open_run
 from standoff.monitor.record import RecordKeeper, RunRecord
 from standoff.monitor.run import ABOUT, Run, warnings_of
+from standoff.monitor.same_run import check_resumable, looks_name, other_film, other_means
 
 __all__ = [
     "ABOUT",
@@ -24,6 +25,10 @@ __all__ = [
     "Run",
     "RunRecord",
     "build_monitor",
+    "check_resumable",
+    "looks_name",
     "open_run",
+    "other_film",
+    "other_means",
     "warnings_of",
 ]

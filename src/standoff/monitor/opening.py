@@ -7,19 +7,22 @@ from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 
+from standoff.clips import KeptLooks
 from standoff.config import Settings, build_replacement, build_zones, named_files, resolved
 from standoff.core.errors import OutputError
-from standoff.core.outputs import RUN_FILES, ZONES_FILE
-from standoff.core.protocols import Sink
+from standoff.core.outputs import LOOKS_FOLDER, RUN_FILES, ZONES_FILE
+from standoff.core.protocols import EACH_ALONE, Sink
 from standoff.core.types import Outcome
 from standoff.files.fingerprint import digests
 from standoff.files.zone_file import write_zones
 from standoff.monitor.build import build_monitor
+from standoff.monitor.monitor import Monitor
 from standoff.monitor.record import RecordKeeper
 from standoff.monitor.run import Run, describe_run
-from standoff.stages.detect import RecordedDetector
+from standoff.monitor.same_run import looks_name
+from standoff.stages.detect import RecordedDetector, RememberingDetector
 from standoff.stages.frames import local_path, open_source
-from standoff.stages.sinks import Wanted, make_sink, prepare_output
+from standoff.stages.sinks import LooksSink, Wanted, make_sink, prepare_output
 
 
 def open_run(
@@ -28,6 +31,7 @@ def open_run(
     settings: Settings,
     *,
     overwrite: bool = False,
+    resume: bool = False,
     checked: Callable[[], str] | None = None,
     more_sinks: Mapping[str, Sink] | None = None,
     overlaps: bool = True,
@@ -39,6 +43,8 @@ def open_run(
         out: Output folder; created.
         settings: What to run.
         overwrite: Replace the files of an earlier run in the folder.
+        resume: Keep what the detector saw in the folder's run so far, where that is the same run: by film, settings,
+            files and version. Results are those of a run that was not cut short.
         more_sinks: Beside those of the settings, and before them.
         overlaps: As of `Run`.
         checked: For the report, after the last frame: how true the stated errors are, where truth is known.
@@ -73,10 +79,26 @@ def open_run(
         checked=checked,
     )
     # The record first, so that a folder without room is told before anything else is begun.
-    about = {"settings": resolved(settings), "files": digests(named_files(settings)), **describe_run(frames, monitor)}
-    folder = RecordKeeper(prepare_output(out, overwrite=overwrite), about)
+    files = digests(named_files(settings))
+    about = {"settings": resolved(settings), "files": files, **describe_run(frames, monitor)}
+    looks = looks_name(wanted.source, settings, files)
+    path = prepare_output(out, overwrite=overwrite, looks=looks if resume else "")
+    folder = RecordKeeper(path, about)
     own = _begin_outputs(folder, settings.outputs, wanted)
-    return Run(frames, monitor, {**(more_sinks or {}), **own, **extra}, folder, overlaps=overlaps)
+    sinks = {**(more_sinks or {}), **own, **extra}
+    if monitor.detector.describe().get(EACH_ALONE):
+        # Last: it is told whether all others are whole.
+        sinks["looks"] = _keep_looks(monitor, path / LOOKS_FOLDER / looks, wanted)
+    return Run(frames, monitor, sinks, folder, overlaps=overlaps)
+
+
+def _keep_looks(monitor: Monitor, folder: Path, wanted: Wanted) -> Sink:
+    """Let a monitor's detector look only where nobody has, and what it sees be kept until the run is complete."""
+    kept = KeptLooks(folder)
+    sink = LooksSink(folder, kept, wanted.source, wanted.detector or {}, wanted.tables)
+    if len(kept):
+        monitor.detector = RememberingDetector(monitor.detector, kept)
+    return sink
 
 
 def _begin_outputs(folder: RecordKeeper, names: Iterable[str], wanted: Wanted) -> dict[str, Sink]:

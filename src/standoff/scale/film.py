@@ -4,22 +4,18 @@ from __future__ import annotations
 
 import socket
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from standoff import __version__
-from standoff.config import Settings, named_files, resolved
+from standoff.config import Settings, named_files
 from standoff.core.errors import ConfigError, StandoffError
-from standoff.core.outputs import OUTPUTS, RECORD_FILE
+from standoff.core.outputs import LOOKS_FOLDER, OUTPUTS, RECORD_FILE
 from standoff.files.fingerprint import digests
-from standoff.files.json_text import plain, read_json
-from standoff.monitor import open_run
+from standoff.files.json_text import read_json
+from standoff.monitor import open_run, other_film, other_means
 from standoff.scale.result import FilmResult, read_result
-from standoff.stages.frames import open_source
-
-_OF_THE_SOURCE: Final = ("fingerprint", "telemetry")
-"""What makes a film, with the log beside it, another one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,16 +41,18 @@ class FilmPlan:
     def watch(self, cores: int = 0) -> FilmResult:
         """Watch the film, unless that was done before; what is wrong with film or folder is in the result.
 
-        A run in the folder that was stopped, was killed or lost an output is done again.
+        A run in the folder that was stopped, was killed or lost an output is done again; what the detector saw in it is
+        taken where it was the same run.
 
         Args:
             cores: So many threads compute the detector, unless the settings say how many; 0: all there are.
         """
         try:
-            self._check_machine()
+            self.check_machine()
             if self._is_finished():
                 return read_result(self.film, self.out, is_new=False)
-            run = open_run(self.film, self.out, self._with_threads(cores), overwrite=(self.out / RECORD_FILE).exists())
+            is_there = any((self.out / name).exists() for name in (RECORD_FILE, LOOKS_FOLDER))
+            run = open_run(self.film, self.out, self.with_threads(cores), overwrite=is_there, resume=True)
             for _ in run:
                 pass
             # As the run says it: a full disk may have kept its record from being whole.
@@ -65,6 +63,14 @@ class FilmPlan:
             return FilmResult(self.film, self.out, "failed", str(error))
         except OSError as error:
             return FilmResult(self.film, self.out, "failed", error.strerror or str(error))
+
+    def is_complete(self) -> bool:
+        """Tell whether its folder holds a run that came to its end, whatever its settings.
+
+        Raises:
+            DataError: Its record is broken.
+        """
+        return self._record_of_complete_run() is not None
 
     def refuse_other_run(self) -> None:
         """Refuse a folder with a complete run of other settings, files or version, unless that is to be replaced.
@@ -88,7 +94,7 @@ class FilmPlan:
         record = self._record_of_complete_run()
         if record is None:
             return False
-        other = self._other_means(record) or self._other_film(record)
+        other = self._other_means(record) or other_film(record, self.film, self.settings)
         if other and not self.overwrites:
             raise self._refused(other)
         return not other and all((self.out / OUTPUTS[name]).is_file() for name in self.settings.outputs)
@@ -99,22 +105,7 @@ class FilmPlan:
         return record if record.get("status") == "complete" else None
 
     def _other_means(self, record: Mapping[str, Any]) -> str:
-        """Return by what else than settings, files and version of this plan a run was made; empty: by nothing."""
-        before, now = _that_matter(record.get("settings") or {}), _that_matter(plain(resolved(self.settings)))
-        for name in sorted(before.keys() | now.keys()):
-            if before.get(name) != now.get(name):
-                return f"setting `{name}`"
-        files = record.get("files") or {}
-        for name in sorted(files.keys() | self.files.keys()):
-            if files.get(name) != self.files.get(name):
-                return f"content of the file that `{name}` names"
-        return "" if record["versions"]["standoff"] == self.version else "version of standoff"
-
-    def _other_film(self, record: Mapping[str, Any]) -> str:
-        with open_source(self.film, **asdict(self.settings.source)) as source:
-            now = plain(source.describe())
-        is_same = all(record["source"].get(name) == now[name] for name in _OF_THE_SOURCE)
-        return "" if is_same else "film of this name, or flight log"
+        return other_means(record, self.settings, self.files, self.version)
 
     def _refused(self, other: str) -> ConfigError:
         return ConfigError(
@@ -123,7 +114,7 @@ class FilmPlan:
             fix="choose another folder, or pass --overwrite",
         )
 
-    def _check_machine(self) -> None:
+    def check_machine(self) -> None:
         """Refuse a machine with another standoff or other files: its result would not be that of the plan.
 
         Raises:
@@ -141,15 +132,8 @@ class FilmPlan:
                 fix="install the same version everywhere, and let all machines see the same folders",
             )
 
-    def _with_threads(self, cores: int) -> Settings:
+    def with_threads(self, cores: int) -> Settings:
+        """Return the settings with so many threads for the detector, unless they say how many; 0: all there are."""
         detect = self.settings.detect
         threads = detect.intra_op_threads or cores
         return self.settings.model_copy(update={"detect": replace(detect, intra_op_threads=threads)})
-
-
-def _that_matter(settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Return settings without the one that makes a run quicker and no other."""
-    return {
-        **settings,
-        "detect": {name: value for name, value in settings.get("detect", {}).items() if name != "intra_op_threads"},
-    }

@@ -8,6 +8,7 @@ import shutil
 import socket
 import tempfile
 import time
+from collections import Counter
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -19,6 +20,7 @@ from urllib.parse import urlsplit
 from standoff.core.errors import ConfigError, OutputError
 from standoff.files.in_use import in_use
 from standoff.scale.film import FilmPlan
+from standoff.scale.part import FilmPart, parts_of
 from standoff.scale.result import FilmResult
 
 ANSWERS_WITHIN_S: Final = 10.0
@@ -27,6 +29,9 @@ _JOINS: Final = 3
 """So often somebody joins who is not let in."""
 _PORT: Final = 10001
 """Of a cluster's head, for those who are not part of it, unless the address says another."""
+PART_S: Final = 600.0
+"""A film that is longer than one and a half of it is looked at in parts: some hundred pictures for each second that a
+process takes to start."""
 _TRIES_AGAIN: Final = 3
 """So often a film begins again whose process was killed; one that kills every process is bad itself."""
 _AHEAD: Final = 2
@@ -50,11 +55,17 @@ _ENVIRONMENT: Final = {
 }
 
 
-Work = Callable[[FilmPlan, int], FilmResult]
+Work = FilmPlan | FilmPart
+CarryOut = Callable[[Any, int], Any]
 
 
 def watch_films(
-    plans: Iterable[FilmPlan], address: str | None = None, *, cores_per_film: int = 2
+    plans: Iterable[FilmPlan],
+    address: str | None = None,
+    *,
+    cores_per_film: int = 2,
+    part_s: float = PART_S,
+    on_part: Callable[[FilmPart], None] = lambda _: None,
 ) -> Iterator[FilmResult]:
     """Watch films side by side, and yield each one's result when it is done, whatever the order.
 
@@ -62,20 +73,22 @@ def watch_films(
         plans: Taken as there is room for them.
         address: Of a Ray cluster, `ray://HOST[:PORT]`; None: this machine alone.
         cores_per_film: How many cores one film may keep busy.
+        part_s: Length of the parts of long films; inf: each film in one piece.
+        on_part: Is told of each part that was looked at.
 
     Raises:
         ConfigError: Ray is not installed, nobody answers at the address, or the cluster has no machine with a core.
         OutputError: The cluster is gone.
     """
     with connected(address) as ray:
-        yield from Machines(ray, cores_per_film).watch(plans)
+        yield from Machines(ray, cores_per_film, part_s=part_s, on_part=on_part).watch(plans)
 
 
 @dataclass(frozen=True, slots=True)
 class _Handed:
-    """A plan that a process has, and how many processes were lost with it before."""
+    """A film or a part of one that a process has, and how many processes were lost with it before."""
 
-    plan: FilmPlan
+    work: Work
     lost: int = 0
 
 
@@ -85,15 +98,27 @@ class Machines:
     Args:
         ray: Connected.
         cores_per_film: How many cores one film may keep busy.
-        watch: What a process does with a plan and that number of cores.
+        carry_out: What a process does with a film or a part, and that number of cores.
+        part_s: As of `watch_films`.
+        on_part: Likewise.
 
     Raises:
         ConfigError: No machine has a core.
     """
 
-    def __init__(self, ray: Any, cores_per_film: int, watch: Work | None = None) -> None:  # noqa: ANN401
+    def __init__(
+        self,
+        ray: Any,  # noqa: ANN401
+        cores_per_film: int,
+        carry_out: CarryOut | None = None,
+        *,
+        part_s: float = math.inf,
+        on_part: Callable[[FilmPart], None] = lambda _: None,
+    ) -> None:
         self._ray = ray
-        self._looked_s = -math.inf
+        self._part_s, self._on_part = part_s, on_part
+        self._parts_left = Counter[Path]()
+        self._looked_s, self._seen_s = -math.inf, time.monotonic()
         self._known: list[int] = []
         cores = self._cores()
         if not cores:
@@ -105,7 +130,7 @@ class Machines:
         self._needs = min(cores_per_film, max(cores))
         # Each film's libraries would otherwise take all cores of the machine.
         threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), str(self._needs))
-        self._begin = ray.remote(watch or _watch).options(
+        self._begin = ray.remote(carry_out or _carry_out).options(
             # We begin again ourselves: what was handed to a machine that is just dying, Ray takes for lost at once.
             num_cpus=self._needs,
             max_retries=0,
@@ -115,45 +140,87 @@ class Machines:
     def watch(self, plans: Iterable[FilmPlan]) -> Iterator[FilmResult]:
         """Yield the result of each plan when it is done."""
         waiting: dict[Any, _Handed] = {}
-        for plan in plans:
-            self._hand(waiting, _Handed(plan))
-            if len(waiting) >= _AHEAD * max(1, self._places()):
-                yield self._next(waiting)
+        for work in self._in_parts(plans):
+            self._hand(waiting, _Handed(work))
+            while len(waiting) >= _AHEAD * max(1, self._places()):
+                yield from self._next(waiting)
         while waiting:
-            yield self._next(waiting)
+            yield from self._next(waiting)
+
+    def _in_parts(self, plans: Iterable[FilmPlan]) -> Iterator[Work]:
+        """Yield short films, and of long ones the parts, where there is more than one place for them."""
+        for plan in plans:
+            parts = parts_of(plan, self._part_s) if math.isfinite(self._part_s) and self._places() > 1 else []
+            self._parts_left[plan.out] = len(parts)
+            if parts:
+                yield from parts
+            else:
+                yield plan
 
     def _hand(self, waiting: dict[Any, _Handed], handed: _Handed) -> None:
-        waiting[self._begin.remote(handed.plan, self._needs)] = handed
+        waiting[self._begin.remote(handed.work, self._needs)] = handed
 
-    def _next(self, waiting: dict[Any, _Handed]) -> FilmResult:
-        """Wait for one film, and forget it; one whose process was lost begins again."""
-        seen_s = time.monotonic()
+    def _next(self, waiting: dict[Any, _Handed]) -> Iterator[FilmResult]:
+        """Wait for one film or part, and forget it; yield what became of a film.
+
+        What was lost with its process begins again; a film whose parts are all looked at is handed out to be watched.
+        """
         while True:
             done, _ = self._ray.wait(list(waiting), num_returns=1, timeout=_LOOKS_EVERY_S)
             if done:
                 handed = waiting.pop(done[0])
-                result = self._result(done[0], handed)
+                if isinstance(handed.work, FilmPart):
+                    self._take_part(waiting, done[0], handed.work, handed.lost)
+                    return
+                result = self._result(done[0], handed.work, handed.lost)
                 if result is not None:
-                    return result
-                self._hand(waiting, _Handed(handed.plan, handed.lost + 1))
+                    yield result
+                    return
+                self._hand(waiting, _Handed(handed.work, handed.lost + 1))
             if self._places():
-                seen_s = time.monotonic()
-            elif time.monotonic() - seen_s > _NO_MACHINE_S:
-                lost = next(iter(waiting))
-                plan = waiting.pop(lost).plan
+                self._seen_s = time.monotonic()
+            elif time.monotonic() - self._seen_s > _NO_MACHINE_S:
+                work = waiting.pop(next(iter(waiting))).work
+                if isinstance(work, FilmPart):
+                    self._end_part(waiting, work)
+                    return
                 message = f"no machine of the cluster has {self._needs} cores any more"
-                return FilmResult(plan.film, plan.out, "failed", message)
+                yield FilmResult(work.film, work.out, "failed", message)
+                return
 
-    def _result(self, done: Any, handed: _Handed) -> FilmResult | None:  # noqa: ANN401
+    def _take_part(self, waiting: dict[Any, _Handed], done: Any, part: FilmPart, lost: int) -> None:  # noqa: ANN401
+        """Begin a part again whose process was lost; otherwise it has come to its end, one way or the other."""
+        errors = self._ray.exceptions
+        try:
+            self._ray.get(done)
+        except errors.RayTaskError:
+            # Whoever watches the film meets the same fault, and says so.
+            self._end_part(waiting, part)
+        except errors.RayError:
+            if lost < _TRIES_AGAIN:
+                self._hand(waiting, _Handed(part, lost + 1))
+            else:
+                self._end_part(waiting, part)
+        else:
+            self._end_part(waiting, part)
+
+    def _end_part(self, waiting: dict[Any, _Handed], part: FilmPart) -> None:
+        """Hand a film out to be watched when nobody looks at a part of it any more."""
+        self._on_part(part)
+        self._parts_left[part.plan.out] -= 1
+        if not self._parts_left[part.plan.out]:
+            self._hand(waiting, _Handed(part.plan))
+
+    def _result(self, done: Any, plan: FilmPlan, lost: int) -> FilmResult | None:  # noqa: ANN401
         """Return the result of a film; None: its process was lost, and another is to watch it."""
-        errors, plan = self._ray.exceptions, handed.plan
+        errors = self._ray.exceptions
         try:
             result: FilmResult = self._ray.get(done)
         except errors.RayTaskError as error:
             # A fault of ours in one film, or of a stage of somebody's own: the others go on.
             return FilmResult(plan.film, plan.out, "failed", _one_line(f"{type(error.cause).__name__}: {error.cause}"))
         except errors.RayError as error:
-            if handed.lost < _TRIES_AGAIN:
+            if lost < _TRIES_AGAIN:
                 return None
             message = _one_line(f"its process was lost {_TRIES_AGAIN + 1} times: {error}")
             return FilmResult(plan.film, plan.out, "failed", message)
@@ -173,13 +240,15 @@ class Machines:
         return self._known
 
 
-def _watch(plan: FilmPlan, cores: int) -> FilmResult:
-    """Watch a film in a process of Ray's."""
+def _carry_out(work: Work, cores: int) -> FilmResult | str:
+    """Watch a film, or look at a part of one, in a process of Ray's."""
     import cv2
 
     cv2.setNumThreads(cores)
-    _wait_until_free(plan.out)
-    return plan.watch(cores)
+    if isinstance(work, FilmPart):
+        return work.look(cores)
+    _wait_until_free(work.out)
+    return work.watch(cores)
 
 
 def _wait_until_free(folder: Path) -> None:

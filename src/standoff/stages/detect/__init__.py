@@ -21,6 +21,7 @@ from standoff.stages.detect.point_crops import (
 )
 from standoff.stages.detect.point_network import CLASS_INPUT, CROPS_INPUT, point_metadata
 from standoff.stages.detect.recorded import RecordedDetector
+from standoff.stages.detect.remembering import RememberingDetector
 from standoff.stages.detect.runtime import ONNX_ERRORS, available_providers, open_session
 from standoff.stages.detect.shared import SharedDetector
 from standoff.stages.detect.shipped import SHIPPED_MODELS, ShippedModel, find_ground_points, find_model
@@ -44,6 +45,7 @@ __all__ = [
     "OnnxDetector",
     "Provider",
     "RecordedDetector",
+    "RememberingDetector",
     "SharedDetector",
     "ShippedModel",
     "available_providers",

@@ -89,6 +89,7 @@ class OnnxDetector(protocols.Detector):
             "boxes": "parts of the input" if self._network.boxes_are_parts else "as usual in the family",
             "warnings": list(self._network.warnings),
             "input_size_px": list(self._network.interface.input_size_px),
+            protocols.EACH_ALONE: True,
             "view_share": list(view_share(self._params.slices, self._params.slice_overlap)),
             KEY: dict(self._network.interface.finds_workers),
             "classes": list(self._classes),

@@ -4,6 +4,7 @@ from standoff.core.watched_shares import percent_text
 from standoff.stages.sinks.folder import prepare_output
 from standoff.stages.sinks.frame_measurements import FrameMeasurements
 from standoff.stages.sinks.hazards import HazardSink
+from standoff.stages.sinks.looks import LooksSink
 from standoff.stages.sinks.make import Wanted, make_sink
 from standoff.stages.sinks.params import DrawParams, ReportParams, ShowParams, TableParams, VideoParams
 from standoff.stages.sinks.report import ReportSink
@@ -29,6 +30,7 @@ __all__ = [
     "DrawParams",
     "FrameMeasurements",
     "HazardSink",
+    "LooksSink",
     "ReportParams",
     "ReportSink",
     "ShowParams",

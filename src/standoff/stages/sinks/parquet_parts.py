@@ -61,10 +61,8 @@ class ParquetParts:
         if not self._rows:
             return
         self._is_whole = False
-        columns = [_joined([chunk[field.name] for chunk in self._chunks], field.type) for field in self._schema]
         part = self._folder / f"part-{len(self._parts):06d}.parquet"
-        with partial_file(part) as partial:
-            pq.write_table(pa.Table.from_arrays(columns, schema=self._schema), partial)
+        write_rows(part, self._schema, self._chunks)
         self._parts.append(part)
         self._is_whole = True
         self._chunks, self._rows = [], 0
@@ -87,6 +85,17 @@ class ParquetParts:
             if gathered:
                 writer.write_table(pa.concat_tables(gathered))
         shutil.rmtree(self._folder)
+
+
+def write_rows(path: Path, schema: pa.Schema, chunks: Sequence[Columns]) -> None:
+    """Write rows as one whole file, on the disk before it has its name; NaN becomes null.
+
+    Raises:
+        OSError: There is no room.
+    """
+    columns = [_joined([chunk[field.name] for chunk in chunks], field.type) for field in schema]
+    with partial_file(path) as partial:
+        pq.write_table(pa.Table.from_arrays(columns, schema=schema), partial)
 
 
 def _joined(chunks: list[Column], arrow_type: pa.DataType) -> pa.Array:

@@ -29,7 +29,7 @@ from standoff.clips import (
 from standoff.core.classes import CLASSES
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.outputs import SCHEMA_VERSION
-from standoff.core.types import FrameResult, IntArray, Outcome, TextArray, WatchedGround
+from standoff.core.types import Detections, Frame, FrameResult, IntArray, Outcome, TextArray, WatchedGround
 from standoff.core.watched_shares import around_tracks
 from standoff.files.json_text import plain
 from standoff.stages.sinks.params import TableParams
@@ -145,8 +145,7 @@ def _schema(columns: tuple[Column, ...]) -> pa.Schema:
     return schema_of(columns, _ABOUT)
 
 
-def _frame_columns(result: FrameResult, rows: int) -> dict[str, TextArray]:
-    frame = result.frame
+def _frame_columns(frame: Frame, rows: int) -> dict[str, TextArray]:
     values = {
         "stream_id": frame.stream_id,
         "frame": frame.index,
@@ -161,7 +160,7 @@ def _track_rows(result: FrameResult) -> Columns:
     tracks, positions = result.tracks, result.positions
     variance = positions.covariance_m2
     return {
-        **_frame_columns(result, len(tracks)),
+        **_frame_columns(result.frame, len(tracks)),
         "track_id": tracks.track_id,
         "class": _NAMES[tracks.class_id],
         "score": tracks.score,
@@ -216,7 +215,7 @@ def _classes_of(track_id: IntArray, result: FrameResult) -> TextArray:
 def _proximity_rows(result: FrameResult) -> Columns:
     pairs = result.proximities
     return {
-        **_frame_columns(result, len(pairs)),
+        **_frame_columns(result.frame, len(pairs)),
         **pairs.columns(),
         "class_a": _classes_of(pairs.track_a, result),
         "class_b": _classes_of(pairs.track_b, result),
@@ -247,13 +246,13 @@ def _frame_rows(result: FrameResult) -> Columns:
         **map_values(result.ground),
         **_watched_values(result.watched),
     }
-    return {**_frame_columns(result, 1), **{name: [value] for name, value in values.items()}}
+    return {**_frame_columns(result.frame, 1), **{name: [value] for name, value in values.items()}}
 
 
-def _detection_rows(result: FrameResult) -> Columns:
+def detection_rows(frame: Frame, found: Detections, *, detected: bool) -> Columns:
     """Return a row for each detection, or one without a box: every frame that was read must be in the table."""
-    found, rows = result.detections, max(len(result.detections), 1)
-    columns = {**_frame_columns(result, rows), "detected": np.full(rows, result.detected)}
+    rows = max(len(found), 1)
+    columns = {**_frame_columns(frame, rows), "detected": np.full(rows, detected)}
     if len(found) == 0:
         nothing: TextArray = np.array([None], dtype=object)
         names = ("score", "class", "class_id")
@@ -298,4 +297,6 @@ ZONED_TRACKS = Table(_schema((*_TRACK_COLUMNS, _ZONES_COLUMN)), _zoned_track_row
 """`TRACKS` of a site that has zones, with a column for them."""
 PROXIMITY = Table(_schema(_PROXIMITY_COLUMNS), _proximity_rows)
 FRAMES = Table(_schema(_FRAMES_COLUMNS), _frame_rows)
-DETECTIONS = Table(_schema(COLUMNS), _detection_rows)
+DETECTIONS = Table(
+    _schema(COLUMNS), lambda result: detection_rows(result.frame, result.detections, detected=result.detected)
+)
