@@ -77,6 +77,8 @@ test-live: $(READY)
 soak: $(READY)
 	SOAK_KILLS=200 SOAK_HOURS=$(or $(HOURS),2) $(BIN)/python -m pytest tests/service/live -s -m "soak or live" \
 	  -k "soak or killed" -p no:xdist
+	SOAK_FUZZED=$(or $(FUZZED),100000) $(BIN)/python -m pytest tests/messages/test_fuzzed_messages.py tests/test_fuzzed_site.py \
+	  -k "damaged and 0"
 
 test-processors: $(READY)
 	$(BIN)/python tests/other_processors.py $(TESTS)

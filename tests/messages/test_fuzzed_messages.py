@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import random
 from typing import Any, Final, cast
 
@@ -18,6 +19,8 @@ from standoff.messages import EVENT_TYPES, Acknowledgement, DevicePosition, Hear
 from standoff.messages import read_message as read_device
 from standoff.service.live.drone_word import read_osd
 
+FUZZED = int(os.environ.get("SOAK_FUZZED", "2500"))
+"""`make soak` asks for 100,000."""
 VALID = [text_of(one, TIMING).encode() for one in ONE_OF_EACH]
 VALID_DEVICE = [
     json.dumps({"sigma_m": POSITION.sigma_m, "x_m": 1.0, "y_m": 2.0, "age_ms": 5}).encode(),
@@ -66,7 +69,7 @@ def never_fails(payload: bytes) -> None:
 @pytest.mark.parametrize("seed", seeds(10, quick=2))
 def test_thousands_of_damaged_messages_are_read_or_refused(seed: int) -> None:
     rng = random.Random(seed)
-    for _ in range(2500):
+    for _ in range(FUZZED):
         never_fails(damaged(rng, rng.choice([*VALID, *VALID_DEVICE, OSD]), *TRIPPING))
 
 

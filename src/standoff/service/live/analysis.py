@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
-import threading
 import time
 from typing import Final
 
@@ -57,7 +56,7 @@ class Analysis:
         """Go on until the process that started it is gone, or asks for the end."""
         signal.signal(signal.SIGTERM, lambda *_: self._end())
         signal.signal(signal.SIGINT, signal.SIG_IGN)
-        threading.Thread(target=self._beat, daemon=True, name="beat").start()
+        self._workplace.repeat(self._beat, _BEAT_S)
         checked_s = written_s = 0.0
         while not self._is_ended:
             waiting = [name for name, stream in self._streams.items() if stream.has_news()]
@@ -149,14 +148,11 @@ class Analysis:
             stream.write_words()
 
     def _beat(self) -> None:
-        """Say again and again that it is alive, and for how long it has been at one picture."""
-        while True:
-            busy_s = 0.0 if self._busy_since_s is None else time.monotonic() - self._busy_since_s
-            with contextlib.suppress(ValueError):
-                self._word.write({"beat_s": time.monotonic(), "pid": os.getpid(), "busy_s": busy_s})
-            if not self._workplace.is_owned():
-                os._exit(0)
-            time.sleep(_BEAT_S)
+        """Say that it is alive, and for how long it has been at one picture."""
+        now_s, since_s = time.monotonic(), self._busy_since_s
+        busy_s = 0.0 if since_s is None else now_s - since_s
+        with contextlib.suppress(ValueError):
+            self._word.write({"beat_s": now_s, "pid": os.getpid(), "busy_s": busy_s})
 
 
 def run(workplace: Workplace) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import threading
 import time
 from dataclasses import dataclass
 from typing import Final, NamedTuple
@@ -70,7 +69,7 @@ class Capture:
 
     def run(self) -> None:
         """Go on until the process that started it is gone."""
-        threading.Thread(target=self._beat, daemon=True, name="beat").start()
+        self._workplace.repeat(self._beat, BEAT_S)
         backoff = Backoff()
         while True:
             self._say("connecting", self._reason)
@@ -128,16 +127,11 @@ class Capture:
         self._record.write({**words, "connections": self._connections})
 
     def _beat(self) -> None:
-        """Say again and again that it is alive; end the process where it is stuck, or alone."""
-        while True:
-            time.sleep(BEAT_S)
-            now_s = time.monotonic()
-            if not self._workplace.is_owned():
-                os._exit(0)
-            if now_s - max(self._progress_s, self._rest_until_s) > _STUCK_S:
-                self._log.error("stuck; begins anew", phase=self._phase)
-                os._exit(STUCK_CODE)
-            self._write()
+        """Say that it is alive; end the process where it is stuck."""
+        if time.monotonic() - max(self._progress_s, self._rest_until_s) > _STUCK_S:
+            self._log.error("stuck; begins anew", phase=self._phase)
+            os._exit(STUCK_CODE)
+        self._write()
 
 
 class ToldDelay(NamedTuple):

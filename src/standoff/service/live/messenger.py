@@ -7,7 +7,6 @@ import math
 import os
 import queue
 import signal
-import threading
 from dataclasses import asdict
 from datetime import UTC, datetime
 from typing import Any, Final
@@ -99,7 +98,7 @@ class Messenger:
         """Go on until the process that started it is gone, or asks for the end."""
         signal.signal(signal.SIGTERM, lambda *_: self._end())
         signal.signal(signal.SIGINT, signal.SIG_IGN)
-        threading.Thread(target=self._listen, daemon=True, name="bell").start()
+        self._workplace.repeat(self._listen, 0.0)
         routed_s = beaten_s = written_s = 0.0
         pruned_s = -math.inf
         while not self._is_ended:
@@ -127,12 +126,9 @@ class Messenger:
         self._is_ended = True
 
     def _listen(self) -> None:
-        while True:
-            words = self._bell.wait(HEARTBEAT_EVERY_S)
-            if words is not None:
-                self._rung.put(words)
-            if not self._workplace.is_owned():
-                os._exit(0)
+        words = self._bell.wait(HEARTBEAT_EVERY_S)
+        if words is not None:
+            self._rung.put(words)
 
     def _hear(self) -> bool:
         """Take what has come, from the analysis and the broker; return whether there are news to be routed."""

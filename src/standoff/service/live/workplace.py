@@ -9,6 +9,9 @@ import pickle
 import shutil
 import socket
 import tempfile
+import threading
+import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -51,6 +54,23 @@ class Workplace:
             return os.getppid() == int((self.folder / _OWNER).read_text(encoding="ascii"))
         except (OSError, ValueError):
             return False
+
+    def repeat(self, beat: Callable[[], object], every_s: float) -> None:
+        """Do something again and again, in a thread of its own; where the process is left alone, it ends at once.
+
+        Args:
+            beat: What to do.
+            every_s: Pause in between.
+        """
+
+        def go_on() -> None:
+            while True:
+                beat()
+                if not self.is_owned():
+                    os._exit(0)
+                time.sleep(every_s)
+
+        threading.Thread(target=go_on, daemon=True, name="beat").start()
 
     def remove(self) -> None:
         """Take it away, with all that is in it."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 import secrets
-import threading
 import time
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -15,6 +15,7 @@ import uvicorn
 from standoff.core.errors import ConfigError, MissingDependency
 from standoff.service.access import Access
 from standoff.service.live.log import log_of
+from standoff.service.live.shared import SharedRecord
 from standoff.service.live.workplace import Workplace
 from standoff.service.loopback import HOST, listen
 from standoff.service.page_files import page_folder
@@ -46,18 +47,13 @@ def run(workplace: Workplace) -> None:
     guarded = Access(status_app(Overview(workplace), pages), token, opens_once=False, open_paths=OPEN_PATHS)
     config = uvicorn.Config(guarded, log_level="error", access_log=False, lifespan="off", timeout_graceful_shutdown=1)
     server = uvicorn.Server(config)
-    threading.Thread(target=_beat, args=(workplace, address), daemon=True, name="beat").start()
+    workplace.repeat(partial(_beat, workplace.record("page"), address), _BEAT_S)
     server.run(sockets=[listening])
 
 
-def _beat(workplace: Workplace, address: str) -> None:
-    record = workplace.record("page")
-    while True:
-        with suppress(ValueError):
-            record.write({"beat_s": time.monotonic(), "pid": os.getpid(), "address": address})
-        if not workplace.is_owned():
-            os._exit(0)
-        time.sleep(_BEAT_S)
+def _beat(record: SharedRecord, address: str) -> None:
+    with suppress(ValueError):
+        record.write({"beat_s": time.monotonic(), "pid": os.getpid(), "address": address})
 
 
 def _token(state: Path) -> str:
