@@ -215,7 +215,7 @@ def exit_status(ended: Run) -> int:
 
     record, rows = ended.record, ended.record.counts.rows
     if record.status == "interrupted":
-        typer.echo("standoff: interrupted; what was written up to then is whole.", err=True)
+        typer.echo("standoff: interrupted; what was written up to then is whole, and --resume goes on.", err=True)
         return 1
     unmeasured = rows["frames_with_map"] == 0
     if unmeasured:

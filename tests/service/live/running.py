@@ -79,7 +79,8 @@ class Service:
         return self.path.parent / "standoff-state"
 
     def workplace(self) -> Path:
-        words = until(lambda: (self.state / "service.json").exists() and (self.state / "service.json").read_text())
+        written = self.state / "service.json"
+        words = until(lambda: written.exists() and written.read_text(), 60.0, "the beginning of the service")
         return Path(json.loads(words)["workplace"])
 
     def words(self, name: str) -> dict[str, Any]:

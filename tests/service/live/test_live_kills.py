@@ -72,7 +72,8 @@ def test_whoever_is_killed_no_open_hazard_is_lost_and_none_is_told_twice(seed: i
             30.0,
             "that all is over",
         )
-        until(lambda: outbox.counts().keys() <= {"delivered", "superseded"}, 10.0, f"{outbox.counts()}")
+        until(lambda: "waiting" not in outbox.counts(), 10.0, f"{outbox.counts()}")
+        told(f"letters: {outbox.counts()}")
         raised = {row[0] for row in outbox._db.execute(RAISED)}
         outbox.close()
         time.sleep(0.5)
