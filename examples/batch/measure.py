@@ -1,8 +1,9 @@
-"""What a batch costs: films that sleep, ten thousand films on a list, the same films in 1 process and in 2.
+"""What a batch costs: films that sleep, a long list, the same films in 1 process and in 2, a film in parts.
 
     python examples/batch/measure.py overhead
     python examples/batch/measure.py list
     python examples/batch/measure.py films FOLDER --config site.yaml
+    python examples/batch/measure.py parts FOLDER --config site.yaml
 
 Times are those of this machine, with all else that runs on it.
 """
@@ -19,7 +20,18 @@ from pathlib import Path
 from typing import Any
 
 from standoff.config import load_settings
-from standoff.scale import FilmPlan, FilmResult, Findings, Moment, find_films, plan_films, write_overview, write_tables
+from standoff.scale import (
+    FilmPart,
+    FilmPlan,
+    FilmResult,
+    Findings,
+    Moment,
+    find_films,
+    parts_of,
+    plan_films,
+    write_overview,
+    write_tables,
+)
 from standoff.scale.pool import Machines, connected
 
 SLEEP_S = 1.0
@@ -27,6 +39,8 @@ FILMS_A_PROCESS = 6
 PROCESSES = (1, 8, 64)
 LONG_LIST = 10_000
 SAID_EVERY = 1000
+PART_S = 2.5
+"""The demo's film has ten seconds."""
 
 
 def sleeping(plan: Any, cores: int) -> Any:  # noqa: ANN401
@@ -124,10 +138,35 @@ def same_films(folder: Path, config: Path) -> None:
             )
 
 
+def in_parts(folder: Path, config: Path) -> None:
+    """Print how long each film of a folder takes as a whole, its parts take side by side, and what comes after them."""
+    settings = load_settings(config)
+    for film in find_films([folder]):
+        with tempfile.TemporaryDirectory() as out, connected(None, cores=2) as ray:
+            whole, divided = (plan_films([film], Path(out) / name, settings) for name in ("whole", "parts"))
+            parts = parts_of(divided[0], PART_S)
+            machines = Machines(ray, 1, _carried_out)
+            # Processes start, and load what they need, with the first parts.
+            started_s = _took_s(
+                machines.watch(parts_of(plan_films([film], Path(out) / "start", settings)[0], PART_S)[:2])
+            )
+            whole_s, looks_s = _took_s(machines.watch(whole)), _took_s(machines.watch(parts))
+            after_s = _took_s(machines.watch(divided))
+            print(
+                f"{film.name}: start {started_s:.1f} s; as a whole {whole_s:.1f} s; {len(parts)} parts on 2 processes "
+                f"{looks_s:.1f} s, then the film {after_s:.1f} s",
+                flush=True,
+            )
+
+
+def _carried_out(work: FilmPlan | FilmPart, cores: int) -> Any:  # noqa: ANN401
+    return work.watch(cores) if isinstance(work, FilmPlan) else work.look(cores)
+
+
 def main() -> None:
     """Measure what is asked for."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=("overhead", "list", "films"))
+    parser.add_argument("what", choices=("overhead", "list", "films", "parts"))
     parser.add_argument("folder", type=Path, nargs="?", help="of films")
     parser.add_argument("--config", type=Path, help="settings, YAML")
     given = parser.parse_args()
@@ -136,9 +175,11 @@ def main() -> None:
     elif given.what == "list":
         long_list()
     elif given.folder is None:
-        sys.exit("films: name their folder")
-    else:
+        sys.exit(f"{given.what}: name the folder of the films")
+    elif given.what == "films":
         same_films(given.folder, given.config)
+    else:
+        in_parts(given.folder, given.config)
 
 
 if __name__ == "__main__":
