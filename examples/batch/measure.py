@@ -16,18 +16,17 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from standoff.config import load_settings
 from standoff.scale import (
-    FilmPart,
     FilmPlan,
     FilmResult,
     Findings,
     Moment,
     find_films,
-    parts_of,
     plan_films,
     write_overview,
     write_tables,
@@ -139,28 +138,26 @@ def same_films(folder: Path, config: Path) -> None:
 
 
 def in_parts(folder: Path, config: Path) -> None:
-    """Print how long each film of a folder takes as a whole, its parts take side by side, and what comes after them."""
+    """Print how long each film of a folder takes as a whole, and looked at in parts by two processes."""
     settings = load_settings(config)
+    first_second = settings.model_copy(update={"source": replace(settings.source, stop_s=1.0)})
     for film in find_films([folder]):
         with tempfile.TemporaryDirectory() as out, connected(None, cores=2) as ray:
-            whole, divided = (plan_films([film], Path(out) / name, settings) for name in ("whole", "parts"))
-            parts = parts_of(divided[0], PART_S)
-            machines = Machines(ray, 1, _carried_out)
-            # Processes start, and load what they need, with the first parts.
-            started_s = _took_s(
-                machines.watch(parts_of(plan_films([film], Path(out) / "start", settings)[0], PART_S)[:2])
+            start, whole, divided = (
+                plan_films([film], Path(out) / name, own)
+                for name, own in (("start", first_second), ("whole", settings), ("parts", settings))
             )
-            whole_s, looks_s = _took_s(machines.watch(whole)), _took_s(machines.watch(parts))
-            after_s = _took_s(machines.watch(divided))
+            # Processes start, and load what they need, with the first parts.
+            _took_s(Machines(ray, 1, part_s=0.5).watch(start))
+            whole_s = _took_s(Machines(ray, 1).watch(whole))
+            begun_s, looked_s = time.monotonic(), list[float]()
+            machines = Machines(ray, 1, part_s=PART_S, on_part=lambda _: looked_s.append(time.monotonic()))
+            in_parts_s = _took_s(machines.watch(divided))
             print(
-                f"{film.name}: start {started_s:.1f} s; as a whole {whole_s:.1f} s; {len(parts)} parts on 2 processes "
-                f"{looks_s:.1f} s, then the film {after_s:.1f} s",
+                f"{film.name}: as a whole {whole_s:.1f} s; in {len(looked_s)} parts {in_parts_s:.1f} s, of which "
+                f"{looked_s[-1] - begun_s:.1f} s until all were looked at",
                 flush=True,
             )
-
-
-def _carried_out(work: FilmPlan | FilmPart, cores: int) -> Any:  # noqa: ANN401
-    return work.watch(cores) if isinstance(work, FilmPlan) else work.look(cores)
 
 
 def main() -> None:
