@@ -20,7 +20,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from standoff.config import load_settings
+from standoff.config import Settings, load_settings
 from standoff.scale import (
     FilmPlan,
     FilmResult,
@@ -137,27 +137,26 @@ def same_films(folder: Path, config: Path) -> None:
             )
 
 
-def in_parts(folder: Path, config: Path) -> None:
-    """Print how long each film of a folder takes as a whole, and looked at in parts by two processes."""
-    settings = load_settings(config)
+def in_parts(film: Path, settings: Settings) -> None:
+    """Print how long a film takes as a whole, and looked at in parts by two processes."""
     first_second = settings.model_copy(update={"source": replace(settings.source, stop_s=1.0)})
-    for film in find_films([folder]):
-        with tempfile.TemporaryDirectory() as out, connected(None, cores=2) as ray:
-            start, whole, divided = (
-                plan_films([film], Path(out) / name, own)
-                for name, own in (("start", first_second), ("whole", settings), ("parts", settings))
-            )
-            # Processes start, and load what they need, with the first parts.
-            _took_s(Machines(ray, 1, part_s=0.5).watch(start))
-            whole_s = _took_s(Machines(ray, 1).watch(whole))
-            begun_s, looked_s = time.monotonic(), list[float]()
-            machines = Machines(ray, 1, part_s=PART_S, on_part=lambda _: looked_s.append(time.monotonic()))
-            in_parts_s = _took_s(machines.watch(divided))
-            print(
-                f"{film.name}: as a whole {whole_s:.1f} s; in {len(looked_s)} parts {in_parts_s:.1f} s, of which "
-                f"{looked_s[-1] - begun_s:.1f} s until all were looked at",
-                flush=True,
-            )
+    looked_s: list[float] = []
+    with tempfile.TemporaryDirectory() as out, connected(None, cores=2) as ray:
+        start, whole, divided = (
+            plan_films([film], Path(out) / name, own)
+            for name, own in (("start", first_second), ("whole", settings), ("parts", settings))
+        )
+        # Processes start, and load what they need, with the first parts.
+        _took_s(Machines(ray, 1, part_s=0.5).watch(start))
+        whole_s = _took_s(Machines(ray, 1).watch(whole))
+        begun_s = time.monotonic()
+        machines = Machines(ray, 1, part_s=PART_S, on_part=lambda _: looked_s.append(time.monotonic()))
+        in_parts_s = _took_s(machines.watch(divided))
+    print(
+        f"{film.name}: as a whole {whole_s:.1f} s; in {len(looked_s)} parts {in_parts_s:.1f} s, of which "
+        f"{looked_s[-1] - begun_s:.1f} s until all were looked at",
+        flush=True,
+    )
 
 
 def main() -> None:
@@ -176,7 +175,8 @@ def main() -> None:
     elif given.what == "films":
         same_films(given.folder, given.config)
     else:
-        in_parts(given.folder, given.config)
+        for film in find_films([given.folder]):
+            in_parts(film, load_settings(given.config))
 
 
 if __name__ == "__main__":
