@@ -13,7 +13,7 @@ import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
 from standoff.core.motions import NoCameraMotion
-from standoff.core.types import GroundPositions, Tracks
+from standoff.core.types import Detections, GroundPositions, Tracks
 from standoff.evaluation.bench_workload import BenchSite, SiteFilm
 from standoff.stages.watched import GroundWatcher, WatchedParams
 
@@ -30,7 +30,7 @@ def test_judging_a_picture(benchmark: BenchmarkFixture, size: str) -> None:
     ground = site.ground("surveyed").update(frame, site.detections(0), NoCameraMotion("one picture"))
     watcher = GroundWatcher(WatchedParams(judge_every_s=0.0))
     nobody = Tracks.empty(), GroundPositions.empty()
-    assert benchmark(watcher.update, frame, ground, *nobody).judged
+    assert benchmark(watcher.update, frame, Detections.empty(), ground, *nobody).judged
 
 
 def test_baseline_one_gaussian_blur_with_opencv(benchmark: BenchmarkFixture) -> None:

@@ -24,7 +24,7 @@ PUBLIC_NAMES = {
         "columns_of", "is_recording", "load_clip", "map_of", "map_values",
         "metadata_of", "read_clip_table", "read_columns",
         "read_detections", "read_scene", "schema_of",
-    },
+    "KeptLooks", "part_path"},
     "standoff.config": {
         "AlertSettings", "BrokerSettings", "CaptureSettings", "GroundSettings", "LiveSettings", "MarkerSettings",
         "NotifySettings", "ReceiverSettings", "ReferenceSettings", "Replacement", "STAGE_NAMES", "Secret", "Settings",
@@ -58,11 +58,11 @@ PUBLIC_NAMES = {
     "standoff.monitor": {
         "ABOUT", "FanOut", "LiveQueue", "Monitor", "QueueState", "RecordKeeper", "Run", "RunRecord", "build_monitor",
         "open_run", "warnings_of",
-    },
+    "check_resumable", "looks_name", "other_film", "other_means"},
     "standoff.scale": {
         "FilmPlan", "FilmResult", "Findings", "Moment", "find_films", "plan_films", "watch_films", "write_moments",
         "write_overview", "write_tables",
-    },
+    "FilmPart", "parts_of"},
     "standoff.schemas": {"SCHEMAS"},
     "standoff.service.review": {"ReviewPage", "open_review", "review_app", "serve_review"},
     "standoff.service.latency": {"clock_picture", "measure_latency", "read_clock"},
@@ -75,7 +75,7 @@ PUBLIC_NAMES = {
         "POINT_CROP_AROUND", "POINT_CROP_PX", "Provider", "RecordedDetector", "SHIPPED_MODELS", "SharedDetector",
         "ShippedModel", "available_providers", "detections_in_rows", "find_ground_points", "find_model",
         "open_session", "point_crop", "point_metadata", "point_squares_px", "resize",
-    },
+    "RememberingDetector"},
     "standoff.stages.frames": {
         "ArrayPicture", "AvPicture", "FileSource", "LiveAddress", "LivePicture", "LiveStream", "PROFESSIONAL_ERRORS",
         "PROTOCOLS", "Scaler", "SourceParams", "StreamRefused", "StreamUnreachable", "frame_from_array", "local_path",
@@ -99,7 +99,7 @@ PUBLIC_NAMES = {
         "Composer", "DETECTIONS", "DrawParams", "FRAMES", "FrameMeasurements", "HazardSink", "PROXIMITY",
         "ReportParams", "ReportSink", "ShowParams", "TRACKS", "Table", "TableParams", "TableSink", "VideoParams",
         "VideoSink", "Wanted", "ZONED_TRACKS", "detections_table", "make_sink", "percent_text", "prepare_output",
-    },
+    "LooksSink"},
     "standoff.stages.track": {"TrackParams", "Tracker"},
     "standoff.stages.watched": {"GroundWatcher", "WatchedParams"},
     "standoff.targets": {"PAPERS", "Paper", "SIZE_LIMITS_M", "Target", "Tile", "tiles", "write_target"},

@@ -149,8 +149,10 @@ class Locator(Stage, Protocol):
 class GroundWatcher(Stage, Protocol):
     """Judge which of the ground is watched."""
 
-    def update(self, frame: Frame, ground: AnyGround, tracks: Tracks, positions: GroundPositions) -> WatchedGround:
-        """Return what would be found where in this frame."""
+    def update(
+        self, frame: Frame, detections: Detections, ground: AnyGround, tracks: Tracks, positions: GroundPositions
+    ) -> WatchedGround:
+        """Return what would be found where in this frame; `detections` are empty where the detector rested."""
         ...
 
 

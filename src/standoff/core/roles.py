@@ -12,5 +12,6 @@ ROLE_OF_CLASS = np.array([list(Role).index(site_class.role) for site_class in CL
 
 REFERENCE_ROLE = list(Role).index(Role.REFERENCE)
 PERSON_ROLE = list(Role).index(Role.PERSON)
+IS_PERSON: BoolArray = np.array([site_class.role is Role.PERSON for site_class in CLASSES])
 IS_EQUIPMENT: BoolArray = np.array([site_class.role is Role.EQUIPMENT for site_class in CLASSES])
 """By class id."""

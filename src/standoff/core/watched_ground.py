@@ -19,6 +19,7 @@ COLUMNS: Final = 32
 NO_GROUND: Final = -1
 WATCHED: Final = 0
 NO_MAP, OUTSIDE_MAP, UNSURE_MAP, TOO_DARK, NO_CONTRAST, BLURRED, TOO_SMALL, BEHIND_MACHINE = range(1, 9)
+MAYBE_SOMEBODY: Final = 9
 REASONS: Final = (
     "",
     "no ground map",
@@ -29,6 +30,7 @@ REASONS: Final = (
     "blurred",
     "workers would be too small",
     "behind a machine",
+    "somebody may stand there",
 )
 """Why ground is not watched, by its number in `WatchedGround.cells`; the first is of ground that is."""
 

@@ -144,7 +144,7 @@ class Monitor:
         with clocked(stage_ms, "locate"):
             positions = self.locator.update(frame.time_s, tracks, ground)
         with clocked(stage_ms, "watched"):
-            watched = self.watcher.update(frame, ground, tracks, positions)
+            watched = self.watcher.update(frame, detections, ground, tracks, positions)
         with clocked(stage_ms, "proximity"):
             proximities = self.proximity.update(frame.time_s, positions, ground)
         with clocked(stage_ms, "hazard"):

@@ -88,7 +88,9 @@ def test_a_run_without_watched_ground_is_refused(tmp_path: Path) -> None:
 
 
 def workers(height_px: np.ndarray[Any, Any], found: np.ndarray[Any, Any], detector: WorkerFinding) -> WorkerSamples:
+    """Return workers, every third of whom is only suspected where he is found."""
     count = len(height_px)
+    suspected = found & (np.arange(count) % 3 == 0)
     return WorkerSamples(
         clip=Path("clip"),
         frames=1,
@@ -98,7 +100,8 @@ def workers(height_px: np.ndarray[Any, Any], found: np.ndarray[Any, Any], detect
         input_height_px=height_px,
         whole=np.ones(count, dtype=bool),
         cell=np.full(count, WATCHED),
-        found=found,
+        found=found & ~suspected,
+        suspected=suspected,
         in_breach=np.zeros(count, dtype=bool),
         called_clear=np.zeros(count, dtype=bool),
     )

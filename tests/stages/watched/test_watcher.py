@@ -12,6 +12,7 @@ from tolerances import STANDING_REL
 from standoff.core.camera import Camera
 from standoff.core.finding import WorkerFinding
 from standoff.core.types import (
+    Detections,
     Frame,
     GroundMap,
     GroundPositions,
@@ -43,6 +44,7 @@ from standoff.stages.watched.ground_cells import ground_cells
 EXCAVATOR = 1
 FINDING = WorkerFinding((10.0, 20.0, 40.0), (0.0, 0.9, 1.0))
 SEEDS = range(3)
+NOTHING = Detections.empty()
 
 
 def frame(gray: ImageArray, time_s: float = 0.0) -> Frame:
@@ -73,7 +75,7 @@ def machine(box_px: tuple[float, ...], xy_m: tuple[float, float], radius_m: floa
 
 
 def watched(gray: ImageArray, ground: GroundMap | NoGroundMap, watcher: GroundWatcher | None = None) -> WatchedGround:
-    return (watcher or GroundWatcher(finding=FINDING)).update(frame(gray), ground, *nobody())
+    return (watcher or GroundWatcher(finding=FINDING)).update(frame(gray), NOTHING, ground, *nobody())
 
 
 @pytest.mark.parametrize(("altitude_m", "pitch_deg"), [(12.0, 30.0), (25.0, 50.0), (40.0, 75.0)])
@@ -179,7 +181,7 @@ def test_without_a_map_nothing_is_watched() -> None:
 
 def test_what_a_machine_may_hide_is_not_watched() -> None:
     tracks, positions = machine((400.0, 200.0, 600.0, 400.0), (0.0, 20.0), 12.0)
-    found = GroundWatcher(finding=FINDING).update(frame(site_picture(0)), ground_map(), tracks, positions)
+    found = GroundWatcher(finding=FINDING).update(frame(site_picture(0)), NOTHING, ground_map(), tracks, positions)
     x, y = cell_middles_px(SIZE_PX).T.reshape(2, ROWS, COLUMNS)
     behind = (x > 400.0) & (x < 600.0) & (y > 200.0) & (y < 360.0)
     np.testing.assert_array_equal(found.cells == BEHIND_MACHINE, behind)
@@ -190,7 +192,7 @@ def test_how_much_of_the_circle_about_a_machine_is_watched() -> None:
     middle_m, edge_m = ground.to_ground(np.array([[640.0, 360.0], [-0.5, 360.0]]))[0]
     for place_m, least, most in ((middle_m, 1.0, 1.0), (edge_m, 0.4, 0.6), (edge_m - [40.0, 0.0], 0.0, 0.0)):
         tracks, positions = machine((2000.0, 2000.0, 2001.0, 2001.0), tuple(place_m), 5.0)
-        found = watcher.update(frame(site_picture(0)), ground, tracks, positions)
+        found = watcher.update(frame(site_picture(0)), NOTHING, ground, tracks, positions)
         assert least <= found.around[0] <= most
 
 
@@ -198,7 +200,7 @@ def test_a_picture_is_judged_anew_after_a_while() -> None:
     watcher = GroundWatcher(WatchedParams(judge_every_s=0.5), FINDING)
     ground, foggy = ground_map(), (site_picture(0) * 0.1 + 190.0).astype(np.uint8)
     shares = [
-        watcher.update(frame(picture, time_s), ground, *nobody()).share
+        watcher.update(frame(picture, time_s), NOTHING, ground, *nobody()).share
         for time_s, picture in ((0.0, site_picture(0)), (0.2, foggy), (0.4, foggy), (0.5, foggy))
     ]
     assert shares == [1.0, 1.0, 1.0, 0.0]
@@ -213,10 +215,10 @@ def test_what_would_make_ground_watched_is_said_of_what_was_measured() -> None:
     ):
         watcher = GroundWatcher(finding=finding)
         for time_s in (0.0, 1.0):
-            watcher.update(frame(site_picture(0), time_s), ground_map(altitude_m), *nobody())
+            watcher.update(frame(site_picture(0), time_s), NOTHING, ground_map(altitude_m), *nobody())
         said = list(watcher.describe()["warnings"])
         assert len(said) == (words is not None) and all(re.search(str(words), one) for one in said)
         # A stream that had no map for most of the time has another trouble.
         for time_s in range(2, 9):
-            watcher.update(frame(site_picture(0), float(time_s)), NoGroundMap("not found"), *nobody())
+            watcher.update(frame(site_picture(0), float(time_s)), NOTHING, NoGroundMap("not found"), *nobody())
         assert [one for one in watcher.describe()["warnings"] if "most ground" in one] == []

@@ -16,7 +16,7 @@ _FEWEST: Final = 20
 
 
 def measure_finding(samples: Sequence[WorkerSamples]) -> WorkerFinding:
-    """Count which of the workers are found of whom nothing is hidden: of what hides, no rule about the ground knows.
+    """Count which of the workers are in a track, or suspected, of whom nothing is hidden: of what hides nobody knows.
 
     Bands of height, each a factor of the root of 2 wide, are made to rise with the height, as few workers in one of
     them would else make it fall (isotonic regression: Barlow et al. 1972). Bands of fewer than 20 are left out.
@@ -29,7 +29,7 @@ def measure_finding(samples: Sequence[WorkerSamples]) -> WorkerFinding:
     """
     seen = np.concatenate([one.whole for one in samples])
     height_px = np.concatenate([one.input_height_px for one in samples])[seen]
-    found = np.concatenate([one.found for one in samples])[seen]
+    found = np.concatenate([one.found | one.suspected for one in samples])[seen]
     edges = np.sqrt(np.multiply(_HEIGHTS_PX[:-1], _HEIGHTS_PX[1:]))
     band = np.searchsorted(edges, height_px)
     counts = np.bincount(band, minlength=len(_HEIGHTS_PX))

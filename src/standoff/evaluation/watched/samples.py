@@ -12,7 +12,7 @@ from standoff.core.errors import DataError
 from standoff.core.finding import WorkerFinding
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.types import IntArray
-from standoff.core.watched_ground import COLUMNS, ROWS, cell_of
+from standoff.core.watched_ground import COLUMNS, MAYBE_SOMEBODY, ROWS, cell_of
 from standoff.evaluation.matching import NOTHING
 from standoff.evaluation.run_and_clip import WHOLE, BesideTruth, read_beside_truth
 
@@ -33,6 +33,7 @@ class WorkerSamples:
         whole: (N,) whether less than a tenth of him is hidden, and nothing cut off by the picture's edge.
         cell: (N,) what the run says of the ground there, as in `WatchedGround.cells`.
         found: (N,) whether a track shows him.
+        suspected: (N,) whether none does, and the run says that somebody may stand there.
         in_breach: (N,) whether his circle truly touches that of a machine that can be seen.
         called_clear: (N,) whether, of such a machine, the run says nothing because no track shows him, or measures
             that the circles are a metre apart or more.
@@ -47,6 +48,7 @@ class WorkerSamples:
     whole: BoolArray
     cell: IntArray
     found: BoolArray
+    suspected: BoolArray
     in_breach: BoolArray
     called_clear: BoolArray
 
@@ -74,6 +76,8 @@ def read_worker_samples(run: Path, clip: Path) -> WorkerSamples:
     in_breach, called_clear = _breaches(beside)
     detector = WorkerFinding.of_detector(beside.record.get("model") or {})
     height_px = (truth["full_y2_px"] - truth["full_y1_px"])[asked]
+    cell = cells[row, place[asked, 0], place[asked, 1]]
+    found = beside.track_row[asked] != NOTHING
     return WorkerSamples(
         clip=clip,
         frames=len(cells),
@@ -82,8 +86,9 @@ def read_worker_samples(run: Path, clip: Path) -> WorkerSamples:
         height_px=height_px,
         input_height_px=height_px / detector.picture_px_per_input_px(beside.size_px),
         whole=truth["sight"][asked] == WHOLE,
-        cell=cells[row, place[asked, 0], place[asked, 1]],
-        found=beside.track_row[asked] != NOTHING,
+        cell=cell,
+        found=found,
+        suspected=~found & (cell == MAYBE_SOMEBODY),
         in_breach=in_breach[asked],
         called_clear=called_clear[asked],
     )

@@ -128,6 +128,6 @@ def _findable(one: WorkerSamples) -> BoolArray:
     could = np.zeros(len(band), dtype=np.bool_)
     for each in np.unique(band):
         here = one.whole & (band == each)
-        if here.sum() >= _FEWEST and one.found[here].mean() >= FINDABLE_SHARE:
+        if here.sum() >= _FEWEST and (one.found | one.suspected)[here].mean() >= FINDABLE_SHARE:
             could[here] = True
     return could

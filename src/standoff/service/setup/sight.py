@@ -224,7 +224,7 @@ class Sight:
                 entities=entities,
             )  # fmt: skip
         watcher = build_watcher(seen.settings, self.film.detector)
-        watched = watcher.update(seen.frame, ground, tracks, positions)
+        watched = watcher.update(seen.frame, seen.detections, ground, tracks, positions)
         top_px = ground.anchors_px if draft.ground == "reference" else np.zeros((0, 2))
         return GroundAnswer(
             time_s=seen.frame.time_s,

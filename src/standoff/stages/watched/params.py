@@ -20,10 +20,20 @@ class WatchedParams:
         float,
         Interval(gt=0, lt=1),
         Doc(
-            "Ground is watched where the detector, in one picture, finds this share of workers as tall as they would "
-            "appear there."
+            "Ground is watched where this share of workers, as tall as they would appear there, is in a track or at "
+            "least suspected (`suspect_score`)."
         ),
     ] = 0.9
+    suspect_score: Annotated[
+        float,
+        Interval(ge=0, le=1),
+        Doc(
+            "Where the detector is so sure of a worker, and no track shows him, somebody may stand: the ground is not "
+            "watched. 1 is never."
+        ),
+    ] = 0.2
+    suspect_s: Annotated[float, Ge(0), Doc("For so long after it was seen.")] = 2.0
+    suspect_radius_m: Annotated[float, Gt(0), Doc("So far around.")] = 1.5
     largest_sigma_m: Annotated[
         float, Gt(0), Doc("And where the map places them with no more than this standard error.")
     ] = 1.0

@@ -12,11 +12,12 @@ from standoff.core import protocols
 from standoff.core.finding import WorkerFinding
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.roles import IS_EQUIPMENT
-from standoff.core.types import Frame, GroundMap, GroundPositions, NoGroundMap, Tracks
+from standoff.core.types import Detections, Frame, GroundMap, GroundPositions, NoGroundMap, Tracks
 from standoff.core.watched_ground import (
     BEHIND_MACHINE,
     BLURRED,
     COLUMNS,
+    MAYBE_SOMEBODY,
     NO_CONTRAST,
     NO_GROUND,
     NO_MAP,
@@ -34,6 +35,7 @@ from standoff.core.watched_ground import (
 from standoff.stages.watched.ground_cells import ground_cells
 from standoff.stages.watched.params import WatchedParams
 from standoff.stages.watched.quality import PictureQuality, picture_quality
+from standoff.stages.watched.suspects import Suspects
 
 _PARTS: Final = (ROWS // 2, COLUMNS // 2)
 _GUESSED: Final = "nobody measured how small a worker the detector finds: which ground is watched is a guess"
@@ -49,7 +51,8 @@ class GroundWatcher(protocols.GroundWatcher):
     """Judge the pictures of one stream.
 
     Ground is watched where the map is sure, the picture is sharp, bright and clear enough, and a worker would be tall
-    enough for the detector. What else may hide a worker, a wall or a heap, nobody knows.
+    enough for the detector; but not where the detector sees what may be one. What else may hide a worker, a wall or a
+    heap, nobody knows.
 
     Args:
         params: Settings; the defaults when left out.
@@ -73,6 +76,7 @@ class GroundWatcher(protocols.GroundWatcher):
         self._judged_s = -math.inf
         self._cells: CellArray = np.zeros((ROWS, COLUMNS), dtype=np.int8)
         self._found: FloatArray = np.zeros((ROWS, COLUMNS))
+        self._suspects = Suspects(self._params)
         self._looks = self._judged = self._judged_small = 0
         self._usual_px = 0.0
 
@@ -101,12 +105,18 @@ class GroundWatcher(protocols.GroundWatcher):
         ]
 
     def update(
-        self, frame: Frame, ground: GroundMap | NoGroundMap, tracks: Tracks, positions: GroundPositions
+        self,
+        frame: Frame,
+        detections: Detections,
+        ground: GroundMap | NoGroundMap,
+        tracks: Tracks,
+        positions: GroundPositions,
     ) -> WatchedGround:
         """Judge one frame.
 
         Args:
             frame: With its picture.
+            detections: Unsure ones, too: who is in no track may stand there all the same.
             ground: The frame's map, or why there is none.
             tracks: What is seen, machines among it.
             positions: Of the tracks, row by row.
@@ -123,6 +133,8 @@ class GroundWatcher(protocols.GroundWatcher):
             self._judged_s = frame.time_s
         cells = self._cells.copy()
         cells[self._behind_machines(tracks, frame.size_px) & (cells == WATCHED)] = BEHIND_MACHINE
+        self._suspects.note(frame.time_s, detections, tracks, ground)
+        cells[self._suspects.cells(ground, frame.size_px, _DISC) & (cells != NO_GROUND)] = MAYBE_SOMEBODY
         around = self._around(cells, positions, ground, frame.size_px)
         return WatchedGround(cells, np.where(cells == WATCHED, self._found, np.nan), around)
 
