@@ -68,8 +68,9 @@ def _finding_table(result: WatchedResult) -> Table:
     pairs = zip(finding.height_px, finding.share, strict=True) if finding.measured else ()
     rows: list[tuple[str, ...]] = [(f"{height_px:.0f} px", f"{100 * share:.0f} %") for height_px, share in pairs]
     least_px = finding.least_height_px(0.9) if finding.measured else float("inf")
-    caption = f"Pixels of the detector's input. Nine of ten are found from {least_px:.0f} px."
-    return Table("Workers found by how tall they are, nothing of them hidden", ("height", "found"), rows, caption)
+    caption = f"Pixels of the detector's input. Nine of ten are noticed from {least_px:.0f} px."
+    title = "Workers in a track, or where somebody may stand, by how tall they are; nothing of them hidden"
+    return Table(title, ("height", "noticed"), rows, caption)
 
 
 def _cells(missed: Missed) -> tuple[str, str, str]:

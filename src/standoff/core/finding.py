@@ -23,7 +23,8 @@ class WorkerFinding:
 
     Attributes:
         height_px: Heights of boxes in the network's input, rising.
-        share: Of those of whom nothing is hidden, found at each of them: a track shows them.
+        share: Of those of whom nothing is hidden, noticed at each of them: a track shows them, or the ground under them
+            is one on which somebody may stand.
         input_size_px: (width, height) of the network's input; (0, 0): as large as the picture.
         view_share: The parts of the picture's width and height that the input shows, less than 1 where it looks at
             slices.

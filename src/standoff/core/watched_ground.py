@@ -42,8 +42,8 @@ class WatchedGround:
     Attributes:
         cells: (ROWS, COLUMNS) `NO_GROUND` where the picture shows none, `WATCHED`, or the number of the first of
             `REASONS` for which it is not; (0, 0) where nobody judged.
-        found_share: (ROWS, COLUMNS) of the workers who stand there, how many the detector finds in one picture; NaN
-            where the ground is not watched.
+        found_share: (ROWS, COLUMNS) of the workers who stand there, how many are noticed; NaN where the ground is not
+            watched.
         around: (M,) of the ground about each track within the radii in which a worker counts as in danger, what share
             is watched; NaN of what is no machine, and where it has no place.
     """
