@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -88,9 +89,9 @@ def test_a_run_without_watched_ground_is_refused(tmp_path: Path) -> None:
 
 
 def workers(height_px: np.ndarray[Any, Any], found: np.ndarray[Any, Any], detector: WorkerFinding) -> WorkerSamples:
-    """Return workers, every third of whom is only suspected where he is found."""
+    """Return workers, every tenth of whom is only suspected where he is noticed."""
     count = len(height_px)
-    suspected = found & (np.arange(count) % 3 == 0)
+    suspected = found & (np.arange(count) % 10 == 0)
     return WorkerSamples(
         clip=Path("clip"),
         frames=1,
@@ -124,3 +125,12 @@ def test_few_workers_tell_nothing() -> None:
     few = workers(np.full(19, 40.0), np.ones(19, dtype=bool), WorkerFinding())
     assert not measure_finding([few]).measured
     assert score_watched([few]).finding.to_dict() == {}
+
+
+def test_whom_nobody_warns_counts_only_where_most_others_are_in_a_track() -> None:
+    few, most = (
+        workers(np.full(300, height_px), np.ones(300, dtype=bool), WorkerFinding()) for height_px in (16.0, 64.0)
+    )
+    few = replace(few, found=np.arange(300) % 3 == 0, suspected=np.arange(300) % 3 != 0)
+    finding = measure_finding([few, most])
+    assert finding.share == (pytest.approx(1 / 3, abs=1e-3), 1.0)
