@@ -128,9 +128,8 @@ def test_few_workers_tell_nothing() -> None:
 
 
 def test_whom_nobody_warns_counts_only_where_most_others_are_in_a_track() -> None:
-    few, most = (
-        workers(np.full(300, height_px), np.ones(300, dtype=bool), WorkerFinding()) for height_px in (16.0, 64.0)
-    )
+    everybody = np.ones(300, dtype=bool)
+    few, most = (workers(np.full(300, tall_px), everybody, WorkerFinding()) for tall_px in (16.0, 64.0))
     few = replace(few, found=np.arange(300) % 3 == 0, suspected=np.arange(300) % 3 != 0)
     finding = measure_finding([few, most])
     assert finding.share == (pytest.approx(1 / 3, abs=1e-3), 1.0)
