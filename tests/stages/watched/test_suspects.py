@@ -11,7 +11,15 @@ from stages.watched.test_watcher import FINDING, NOTHING, SEEDS, frame, machine,
 
 from standoff.core.homography import FloatArray
 from standoff.core.types import Detections, GroundMap, GroundPositions, NoGroundMap, Tracks
-from standoff.core.watched_ground import MAYBE_SOMEBODY, REASONS, TOO_SMALL, WATCHED, CellArray, cell_of
+from standoff.core.watched_ground import (
+    MAYBE_SOMEBODY,
+    REASONS,
+    TOO_SMALL,
+    WATCHED,
+    CellArray,
+    cell_middles_px,
+    cell_of,
+)
 from standoff.stages.watched import GroundWatcher, WatchedParams
 
 WORKER, EXCAVATOR = 0, 1
@@ -61,7 +69,8 @@ def test_ground_on_which_somebody_may_stand_is_not_watched_and_the_rest_is(seed:
     assert under(cells, foot_px) == MAYBE_SOMEBODY
     maybe = cells == MAYBE_SOMEBODY
     assert (cells[~maybe] == WATCHED).all()
-    far_m = np.linalg.norm(ground_map().to_ground(np.argwhere(maybe)[:, ::-1] * 40.0 + 19.5)[0] - spot(foot_px), axis=1)
+    middles_px = cell_middles_px(SIZE_PX).reshape(*maybe.shape, 2)[maybe]
+    far_m = np.linalg.norm(ground_map().to_ground(middles_px)[0] - spot(foot_px), axis=1)
     # A cell counts as soon as the circle about the place touches it.
     assert far_m.max() < PARAMS.suspect_radius_m + cell_m(foot_px)
 
