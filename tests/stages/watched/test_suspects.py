@@ -21,6 +21,7 @@ from standoff.core.watched_ground import (
     cell_of,
 )
 from standoff.stages.watched import GroundWatcher, WatchedParams
+from standoff.stages.watched.suspects import Suspects
 
 WORKER, EXCAVATOR = 0, 1
 PARAMS = WatchedParams()
@@ -114,6 +115,15 @@ def test_a_suspect_is_remembered_for_a_while_and_no_longer() -> None:
     cells_of(one, seen())
     told = {time_s: under(cells_of(one, NOTHING, time_s)) for time_s in (0.5, 1.9, 2.1)}
     assert told == {0.5: MAYBE_SOMEBODY, 1.9: MAYBE_SOMEBODY, 2.1: WATCHED}
+
+
+def test_who_is_seen_again_and_again_is_remembered_once_as_of_the_last_time() -> None:
+    rng, suspects = np.random.default_rng(0), Suspects(PARAMS)
+    for number in range(200):
+        suspects.note(number / 25.0, seen(FOOT_PX + rng.normal(0.0, 1.0, 2)), Tracks.empty(), ground_map())
+        assert 1 <= len(suspects) <= 4
+    suspects.note(199 / 25.0 + PARAMS.suspect_s + 0.1, NOTHING, Tracks.empty(), ground_map())
+    assert len(suspects) == 0
 
 
 def test_a_suspect_stays_where_he_is_on_the_ground_when_the_camera_turns() -> None:

@@ -18,6 +18,7 @@ from standoff.core.types import Detections, GroundMap, Tracks
 from standoff.core.watched_ground import COLUMNS, ROWS, cell_of
 from standoff.stages.watched.params import WatchedParams
 
+_SAME_PLACE_M: Final = 0.5
 _SAME_PERSON: Final = 0.5
 """Part of the smaller box that a detection shares with a track's: half a person is seen beside the whole one."""
 
@@ -44,8 +45,15 @@ class Suspects:
         maybe = maybe[~_is_one_of(maybe.xyxy_px, people.xyxy_px)]
         places_m, on_ground = ground.to_ground(_feet_px(maybe))
         lasting = (time_s - self._seen_s <= self._params.suspect_s) & ~self._shown(people, ground)
-        self._places_m = np.concatenate([self._places_m[lasting], places_m[on_ground]])
-        self._seen_s = np.concatenate([self._seen_s[lasting], np.full(np.count_nonzero(on_ground), time_s)])
+        self._places_m = np.concatenate([places_m[on_ground], self._places_m[lasting]])
+        self._seen_s = np.concatenate([np.full(np.count_nonzero(on_ground), time_s), self._seen_s[lasting]])
+        # Who is seen again and again is remembered once, as of the last time.
+        newest = np.unique(np.round(self._places_m / _SAME_PLACE_M), axis=0, return_index=True)[1]
+        self._places_m, self._seen_s = self._places_m[newest], self._seen_s[newest]
+
+    def __len__(self) -> int:
+        """Return how many places are remembered."""
+        return len(self._places_m)
 
     def cells(self, ground: GroundMap, size_px: tuple[int, int], around: FloatArray) -> BoolArray:
         """Tell (ROWS, COLUMNS) where somebody may stand.
@@ -56,6 +64,8 @@ class Suspects:
             around: (N, 2) points that stand for the unit circle.
         """
         cells = np.zeros((ROWS, COLUMNS), dtype=np.bool_)
+        if not len(self):
+            return cells
         points_m = self._places_m[:, None] + self._params.suspect_radius_m * around
         points_px, seen = ground.to_image(points_m.reshape(-1, 2))
         places, inside = cell_of(points_px, size_px)
