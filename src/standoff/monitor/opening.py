@@ -86,7 +86,7 @@ def open_run(
     folder = RecordKeeper(path, about)
     own = _begin_outputs(folder, settings.outputs, wanted)
     sinks = {**(more_sinks or {}), **own, **extra}
-    if monitor.detector.describe().get(EACH_ALONE):
+    if (wanted.detector or {}).get(EACH_ALONE):
         # Last: it is told whether all others are whole.
         sinks["looks"] = _keep_looks(monitor, path / LOOKS_FOLDER / looks, wanted)
     return Run(frames, monitor, sinks, folder, overlaps=overlaps)

@@ -30,8 +30,7 @@ _JOINS: Final = 3
 _PORT: Final = 10001
 """Of a cluster's head, for those who are not part of it, unless the address says another."""
 PART_S: Final = 600.0
-"""A film that is longer than one and a half of it is looked at in parts: some hundred pictures for each second that a
-process takes to start."""
+"""Films longer than one and a half of it are looked at in parts; a process takes seconds to start."""
 _TRIES_AGAIN: Final = 3
 """So often a film begins again whose process was killed; one that kills every process is bad itself."""
 _AHEAD: Final = 2
@@ -150,12 +149,10 @@ class Machines:
     def _in_parts(self, plans: Iterable[FilmPlan]) -> Iterator[Work]:
         """Yield short films, and of long ones the parts, where there is more than one place for them."""
         for plan in plans:
-            parts = parts_of(plan, self._part_s) if math.isfinite(self._part_s) and self._places() > 1 else []
+            divides = math.isfinite(self._part_s) and self._places() > 1
+            parts: list[Work] = [*parts_of(plan, self._part_s)] if divides else []
             self._parts_left[plan.out] = len(parts)
-            if parts:
-                yield from parts
-            else:
-                yield plan
+            yield from parts or [plan]
 
     def _hand(self, waiting: dict[Any, _Handed], handed: _Handed) -> None:
         waiting[self._begin.remote(handed.work, self._needs)] = handed
@@ -194,15 +191,12 @@ class Machines:
         try:
             self._ray.get(done)
         except errors.RayTaskError:
-            # Whoever watches the film meets the same fault, and says so.
-            self._end_part(waiting, part)
+            pass  # Whoever watches the film meets the same fault, and says so.
         except errors.RayError:
             if lost < _TRIES_AGAIN:
                 self._hand(waiting, _Handed(part, lost + 1))
-            else:
-                self._end_part(waiting, part)
-        else:
-            self._end_part(waiting, part)
+                return
+        self._end_part(waiting, part)
 
     def _end_part(self, waiting: dict[Any, _Handed], part: FilmPart) -> None:
         """Hand a film out to be watched when nobody looks at a part of it any more."""
