@@ -151,7 +151,8 @@ class Machines:
         for plan in plans:
             divides = math.isfinite(self._part_s) and self._places() > 1
             parts: list[Work] = [*parts_of(plan, self._part_s)] if divides else []
-            self._parts_left[plan.out] = len(parts)
+            if parts:
+                self._parts_left[plan.out] = len(parts)
             yield from parts or [plan]
 
     def _hand(self, waiting: dict[Any, _Handed], handed: _Handed) -> None:
