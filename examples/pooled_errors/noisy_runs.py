@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 
+from standoff.clips import FOOT_COLUMNS
 from standoff.core import homography, protocols
 from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.homography import FloatArray
@@ -52,7 +53,12 @@ class _Views(protocols.Source, protocols.Detector):
         self._frame_of = np.array(rows["frame"], dtype=np.int64)
         class_id = [CLASS_BY_NAME[name].id for name in rows["class"]]
         boxes_px = np.array([rows[side] for side in _BOX], dtype=np.float64).T
-        self._found = Detections(boxes_px, np.array(rows["score"]), np.array(class_id, dtype=np.int64))
+        foot = {name: np.array(rows[name], dtype=np.float64) for name, *_ in FOOT_COLUMNS}
+        foot_px = np.column_stack([foot["foot_x_px"], foot["foot_y_px"]])
+        x_px2, y_px2, both_px2 = foot["foot_sigma_x_px"] ** 2, foot["foot_sigma_y_px"] ** 2, foot["foot_cov_px2"]
+        spread_px2 = np.stack([x_px2, both_px2, both_px2, y_px2], axis=1).reshape(-1, 2, 2)
+        scores, class_ids = np.array(rows["score"]), np.array(class_id, dtype=np.int64)
+        self._found = Detections(boxes_px, scores, class_ids, foot_px, spread_px2)
         sigma = np.zeros(8)
         sigma[TURN], sigma[SHIFT], sigma[LENS] = _TURN_RAD, _SHIFT_M, (_FOCAL, 0.0)
         self._covariance = np.diag(sigma**2)

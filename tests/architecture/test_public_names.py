@@ -115,8 +115,8 @@ PUBLIC_NAMES = {
         "Choice", "LABEL_FILES", "LabelPlan", "LabelReport", "SelectionParams", "choose", "label_frames",
     },
     "standoff.training.ground_point": {
-        "Patches", "PointError", "PointTraining", "measure_points", "read_eyes", "read_patches", "train_points",
-        "write_points",
+        "Patches", "PointError", "PointTraining", "as_found", "measure_points", "read_eyes", "read_patches",
+        "train_points", "write_points",
     },
     "standoff.training.my_site": {"prepare_plan", "read_preset"},
     "standoff_sim.behaviour": {

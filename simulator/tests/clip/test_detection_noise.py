@@ -16,8 +16,12 @@ from standoff_sim.clip.detection_noise import (
     GROUPS,
     LEAST_SCORE,
     NOISE,
+    POINT_MEMORY_S,
+    POINT_NOISE,
+    POINT_WHITE_SHARE,
     ClassNoise,
     NoisyDetector,
+    PointNoise,
     size_of,
 )
 
@@ -32,6 +36,7 @@ def _worker(
 ) -> dict[str, Any]:
     named = dict(zip(_SIDES, box_px, strict=True))
     seen = {"entity_id": entity_id, "class_name": "worker", "class_id": 0, "visible_px": 500, "visible_share": 1.0}
+    seen |= {"foot_x_px": 612.0, "foot_y_px": 345.0}
     return named | seen | more
 
 
@@ -116,3 +121,43 @@ def test_an_error_goes_on_for_a_while_however_often_one_looks(gap_s: float) -> N
 def test_the_same_generator_finds_the_same() -> None:
     assert _found(NOISE, _worker(), 4) == _found(NOISE, _worker(), 4)
     assert _found(NOISE, _worker(), 4) != _found(NOISE, _worker(), 5)
+
+
+_POINTS = {"worker": PointNoise((0.1, 0.05), 0.5, (0.02, -0.04), (0.5, 2.0))}
+_ALL_FOUND = _NONE_FALSE | {"worker": replace(_NONE_FALSE["worker"], found=(50.0, 0, 0))}
+
+
+def _feet(rows: list[dict[str, Any]]) -> FloatArray:
+    """Give (N, 4) error of the ground point and stated standard error, in longer sides of the box."""
+    names = ("foot_x_px", "foot_y_px", "foot_sigma_x_px", "foot_sigma_y_px")
+    return (np.array([[row[name] for name in names] for row in rows]) - [612.0, 345.0, 0.0, 0.0]) / 48.0
+
+
+def test_ground_points_are_off_and_say_so_as_the_table_says() -> None:
+    detector = NoisyDetector(_SIZE_PX, np.random.default_rng(8), _ALL_FOUND, point_noise=_POINTS)
+    feet = _feet(detector.detect(0, 0.0, [_worker(k) for k in range(_COUNT)]))
+    few = 4 / _COUNT**0.5
+    np.testing.assert_allclose(np.median(feet[:, 2:], axis=0), [0.1, 0.05], rtol=1.3 * 0.5 * few)
+    np.testing.assert_allclose(np.log(feet[:, 2:]).std(axis=0), 0.5, rtol=few)
+    standardised = (feet[:, :2] - [0.02, -0.04]) / feet[:, 2:]
+    np.testing.assert_allclose(standardised.mean(axis=0), 0.0, atol=2.0 * few)
+    np.testing.assert_allclose(standardised.std(axis=0), [0.5, 2.0], rtol=few)
+
+
+@pytest.mark.parametrize("gap_s", [0.1, 2.0])
+def test_a_part_of_a_points_error_is_another_in_every_frame_and_the_rest_goes_on(gap_s: float) -> None:
+    detector = NoisyDetector(_SIZE_PX, np.random.default_rng(9), _ALL_FOUND, point_noise=_POINTS)
+    feet = _feet([detector.detect(k, k * gap_s, [_worker()])[0] for k in range(_COUNT)])
+    told = ((feet[:, :2] - [0.02, -0.04]) / feet[:, 2:])[:, 0]
+    expected = (1.0 - POINT_WHITE_SHARE) * np.exp(-gap_s / POINT_MEMORY_S)
+    assert np.corrcoef(told[1:], told[:-1])[0, 1] == pytest.approx(expected, abs=0.08)
+
+
+def test_boxes_are_the_same_whether_there_are_points_or_not() -> None:
+    with_points, without = (
+        NoisyDetector(_SIZE_PX, np.random.default_rng(10), point_noise=points).detect(0, 0.0, [_worker()] * 3)
+        for points in (POINT_NOISE | _POINTS, {})
+    )
+    assert [row["score"] for row in with_points] == [row["score"] for row in without]
+    np.testing.assert_array_equal(_boxes(with_points), _boxes(without))
+    assert all(row["foot_x_px"] is None for row in without)

@@ -43,9 +43,10 @@ def train_points(
     from standoff.cli.console import print_table, progress
     from standoff.core.errors import ConfigError
     from standoff.labels import read_data
-    from standoff.stages.detect import POINT_CLASSES, find_model
+    from standoff.stages.detect import POINT_CLASSES, DetectParams, OnnxDetector, find_model
     from standoff.training.ground_point import (
         PointTraining,
+        as_found,
         measure_points,
         read_eyes,
         read_patches,
@@ -58,11 +59,16 @@ def train_points(
         raise ConfigError(
             expected=f"--only with one of {', '.join(POINT_CLASSES)}", found=", ".join(unknown), fix="correct the name"
         )
-    eyes = read_eyes(find_model(weights))
+    model = find_model(weights)
+    eyes, detector = read_eyes(model), OnnxDetector(model, DetectParams(ground_points="none"))
     labelled = read_data(data)
     learn, hold = (labelled.splits[split] for split in ("train", "val"))
     with progress("reading", len(learn) + len(hold), quiet=quiet, unit="pictures") as on_picture:
-        patches, held = (read_patches(pictures, labelled.classes, on_picture) for pictures in (learn, hold))
+        patches = read_patches(learn, labelled.classes, on_picture)
+        # Its errors are to hold for what a detector finds, in the boxes in which it does.
+        held = read_patches(
+            (as_found(picture, labelled.classes, detector) for picture in hold), labelled.classes, on_picture
+        )
     plan = PointTraining(steps=steps, seed=seed, workers=workers)
     with progress(f"training on {len(patches)} boxes", steps, quiet=quiet, unit="steps") as on_step:
         network = train_points(patches, eyes, plan, on_step)

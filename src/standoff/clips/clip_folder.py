@@ -13,6 +13,7 @@ from typing import Final
 import pyarrow as pa
 
 from standoff.clips.columns import Column, Columns, read_columns, schema_of
+from standoff.clips.detections import FOOT_COLUMNS
 
 CLIP_FORMAT: Final = 1
 """Number of this format; `scene.json` carries it."""
@@ -121,6 +122,7 @@ NOISY_DETECTIONS_SCHEMA: Final = schema_of(
         ("score", _FLOAT, "", "confidence, 0 to 1"),
         ("class", pa.string(), "", "what it is"),
         ("class_id", _WHOLE, "", "position in `standoff.core.classes.CLASSES`"),
+        *FOOT_COLUMNS,
     )
 )
 """One row per detection that a detector might have made, frame by frame, the surest first."""

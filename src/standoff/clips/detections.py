@@ -64,6 +64,8 @@ COLUMNS: Final[tuple[Column, ...]] = (
 """What is written. Readers ask by name and want `_FRAME` and `_BOX` only; there may be more columns in later files, and
 earlier ones lack the ground points, or who tells when a picture was taken."""
 
+_SAME_TIME_S: Final = 1e-6
+"""Two readings of one timestamp differ by the rounding of a subtraction; two frames by a thousand times as much."""
 _RECORD_AGAIN: Final = "repeat `standoff run` with detections among its outputs"
 
 
@@ -97,6 +99,10 @@ class RecordedDetections:
         """Return the position of a frame among those that the run read; None: it did not read it."""
         row = int(np.searchsorted(self.frame, frame))
         return row if row < len(self.frame) and self.frame[row] == frame else None
+
+    def is_at(self, row: int, time_s: float) -> bool:
+        """Tell whether the frame at a position was seen at this time of the film."""
+        return bool(abs(self.time_s[row] - time_s) <= _SAME_TIME_S)
 
     def detections_at(self, row: int) -> Detections:
         """Return the detections of the frame at a position."""

@@ -17,8 +17,6 @@ from standoff.clips.detections import RecordedDetections, read_detections
 from standoff.core.errors import DataError
 from standoff.core.types import Detections, Frame
 
-_SAME_TIME_S: Final = 1e-6
-"""As far as two readings of one timestamp may differ by rounding."""
 _OPEN_PARTS: Final = 4
 """Whoever looks ahead and whoever writes behind are in neighbouring parts."""
 
@@ -58,8 +56,7 @@ class KeptLooks:
             row = None if recorded is None else recorded.row_of(frame.index)
             if recorded is None or row is None or not recorded.detected[row]:
                 continue
-            is_same = recorded.size_px == frame.size_px and abs(recorded.time_s[row] - frame.time_s) <= _SAME_TIME_S
-            if is_same:
+            if recorded.size_px == frame.size_px and recorded.is_at(row, frame.time_s):
                 return recorded.detections_at(row)
         return None
 

@@ -150,10 +150,9 @@ class Machines:
         """Yield short films, and of long ones the parts, where there is more than one place for them."""
         for plan in plans:
             divides = math.isfinite(self._part_s) and self._places() > 1
-            parts: list[Work] = [*parts_of(plan, self._part_s)] if divides else []
-            if parts:
-                self._parts_left[plan.out] = len(parts)
-            yield from parts or [plan]
+            parts = parts_of(plan, self._part_s) if divides else []
+            self._parts_left.update(part.plan.out for part in parts)
+            yield from parts or (plan,)
 
     def _hand(self, waiting: dict[Any, _Handed], handed: _Handed) -> None:
         waiting[self._begin.remote(handed.work, self._needs)] = handed

@@ -3,15 +3,28 @@
 from __future__ import annotations
 
 from dataclasses import fields, replace
+from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
+from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.errors import DataError
 from standoff.core.homography import FloatArray
-from standoff.core.types import ImageArray
+from standoff.core.types import Detections, ImageArray
+from standoff.labels import LabelledPicture
 from standoff.stages.detect import POINT_CLASSES, POINT_CROP_PX, find_model
-from standoff.training.ground_point import Patches, PointTraining, measure_points, read_eyes, read_patches, train_points
+from standoff.testing import ScriptedDetector
+from standoff.training.ground_point import (
+    Patches,
+    PointTraining,
+    as_found,
+    measure_points,
+    read_eyes,
+    read_patches,
+    train_points,
+)
 from standoff.training.ground_point.crops import PATCH_PX, boxed_crop, drawn_crop
 from standoff.training.pictures.augment_params import AugmentParams
 
@@ -37,10 +50,10 @@ def blob_middle(image: ImageArray) -> FloatArray:
 
 
 def test_the_point_goes_with_what_is_seen() -> None:
-    patches, rng = dots(40, 0), np.random.default_rng(1)
+    patches, rng = dots(60, 0), np.random.default_rng(1)
     compared = 0
     for image, point in zip(patches.images, patches.point, strict=True):
-        boxed, place = boxed_crop(rng, image, point)
+        boxed, place = boxed_crop(image, point)
         if np.abs(place - 0.5).max() < 0.35:
             np.testing.assert_allclose(blob_middle(boxed), place, atol=0.01)
             compared += 1
@@ -64,6 +77,26 @@ def test_what_can_be_seen_is_learnt_and_its_errors_hold() -> None:
     assert error.median < 0.06
     told = measure_points(network, dots(200, 4))[EXCAVATOR]
     assert told.stretch == pytest.approx(error.stretch, rel=0.35)
+
+
+def test_errors_are_those_of_what_a_detector_finds_in_the_boxes_in_which_it_does(tmp_path: Path) -> None:
+    cv2.imwrite(str(tmp_path / "site.png"), np.zeros((100, 200, 3), dtype=np.uint8))
+    left_px = np.array([0.0, 40.0, 80.0, 120.0, 160.0])
+    boxes_px = np.column_stack([left_px, np.full(5, 10.0), left_px + 20.0, np.full(5, 50.0)])
+    classes = ("vehicle", "worker", "crane")
+    picture = LabelledPicture(
+        tmp_path / "site.png", (200, 100), boxes_px, np.array([1, 1, 0, 1, 2]),
+        np.array([False, False, False, True, False]), "a", "b", foot_px=boxes_px[:, 2:],
+    )  # fmt: skip
+    worker, excavator = CLASS_BY_NAME["worker"].id, CLASS_BY_NAME["excavator"].id
+    # The first is found loosely, the second too unsurely, the third as something else; the others are not asked for.
+    found = Detections(boxes_px + 2.0, np.array([0.9, 0.2, 0.9, 0.9, 0.9]),
+                       np.array([worker, worker, excavator, worker, worker]))  # fmt: skip
+    seen = as_found(picture, classes, ScriptedDetector({0: found}))
+    np.testing.assert_array_equal(seen.xyxy_px, boxes_px[:1] + 2.0)
+    np.testing.assert_array_equal(seen.foot_px, boxes_px[:1, 2:])
+    assert seen.class_id.tolist() == [1] and not seen.ignored.any()
+    assert len(read_patches([seen], classes)) == 1
 
 
 def test_what_has_no_point_teaches_nothing() -> None:

@@ -1,6 +1,7 @@
 """What a detector would make of a frame, drawn from its truth: misses, edges that are off, scores, false alarms.
 
-The parameters are those of the detector that comes with standoff, fitted by `examples/detection_noise/fit.py`.
+The parameters are those of the detector that comes with standoff, fitted by `examples/detection_noise/fit.py`, and of
+the network that tells ground points in its boxes, by `fit_points.py` beside it.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from types import MappingProxyType
 import numpy as np
 from scipy.special import expit, ndtr
 
+from standoff.clips import FOOT_COLUMNS
 from standoff.core.classes import CLASSES
 from standoff.core.homography import FloatArray
 from standoff_sim.clip.truth import Row
@@ -22,6 +24,7 @@ LEAST_SCORE = 0.1
 """Of `standoff.stages.detect.DetectParams`: what is less sure is not passed on."""
 _SURE = 0.999
 _LATENT = 6  # four edges, presence, score
+_POINT_LATENT = 3  # the point across and down, its stated error
 _SMALLEST_PX = 2.0
 
 
@@ -52,6 +55,23 @@ class ClassNoise:
     false_per_frame: float
     false_size: tuple[float, float]
     false_score: tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class PointNoise:
+    """How the ground points of one class err.
+
+    Attributes:
+        stated: Median of the stated standard errors, across and down, as shares of the box's longer side.
+        spread: Standard deviation of their logarithm from one entity to another.
+        bias: Mean error, right and down, likewise.
+        off: Standard deviation of the errors, across and down, in stated standard errors.
+    """
+
+    stated: tuple[float, float]
+    spread: float
+    bias: tuple[float, float]
+    off: tuple[float, float]
 
 
 GROUPS: Mapping[str, str] = MappingProxyType(
@@ -119,6 +139,17 @@ The sixty frames hold 240 workers, 160 machines, 20 vehicles, 60 reference objec
 last number of `found` and `score` is a weak prior more than a measurement for all but machines.
 """
 
+POINT_MEMORY_S = 5.0
+"""Time after which the part of a ground point's error that lasts is forgotten to 1/e."""
+POINT_WHITE_SHARE = 0.3
+"""Share of its variance that is another in every frame."""
+
+POINT_NOISE: Mapping[str, PointNoise] = MappingProxyType({})
+
+_Look = tuple[list[float], float, int, tuple[float, ...] | None]
+"""Box, score, class, and the ground point as `_FOOT` names it."""
+_FOOT = tuple(column[0] for column in FOOT_COLUMNS)
+
 
 class NoisyDetector:
     """Draws detections frame after frame; errors of one entity go on for a while.
@@ -128,14 +159,19 @@ class NoisyDetector:
         rng: Decides.
         noise: By group of classes, for another detector.
         memory_s: Of errors.
+        point_noise: Of ground points, by class; other classes have none.
     """
 
     def __init__(
         self, size_px: tuple[int, int], rng: np.random.Generator, noise: Mapping[str, ClassNoise] = NOISE,
-        memory_s: float = MEMORY_S,
+        memory_s: float = MEMORY_S, point_noise: Mapping[str, PointNoise] = POINT_NOISE,
     ) -> None:  # fmt: skip
-        self._size_px, self._rng, self._noise, self._memory_s = np.array(size_px, np.float64), rng, noise, memory_s
-        self._latent: dict[int, tuple[float, FloatArray]] = {}
+        self._size_px, self._rng, self._noise = np.array(size_px, np.float64), rng, noise
+        self._point_noise = point_noise
+        self._latent = _Remembered(rng, _LATENT, memory_s)
+        # Boxes do not depend on whether there are points.
+        self._point_rng = rng.spawn(1)[0]
+        self._point_latent = _Remembered(self._point_rng, _POINT_LATENT, POINT_MEMORY_S)
 
     def detect(self, frame: int, time_s: float, entities: Sequence[Row]) -> list[Row]:
         """Return rows of `NOISY_DETECTIONS_SCHEMA`.
@@ -151,34 +187,39 @@ class NoisyDetector:
         return [
             {"frame": frame, "time_s": time_s, **dict(zip(("x1_px", "y1_px", "x2_px", "y2_px"), xyxy, strict=True))}
             | {"score": score, "class": CLASSES[class_id].name, "class_id": class_id}
-            for xyxy, score, class_id in boxes
+            | dict(zip(_FOOT, foot or (None,) * len(_FOOT), strict=True))
+            for xyxy, score, class_id, foot in boxes
         ]
 
-    def _look(self, row: Row, time_s: float) -> tuple[list[float], float, int] | None:
-        """Return box, score and class of one entity, or None when it is missed."""
+    def _look(self, row: Row, time_s: float) -> _Look | None:
+        """Return what is made of one entity, or None when it is missed."""
         noise = self._noise[GROUPS[row["class_name"]]]
         box_px = np.array([row[name] for name in ("x1_px", "y1_px", "x2_px", "y2_px")])
         sides_px = box_px[2:] - box_px[:2]
         features = np.array([1.0, size_of(sides_px), 1.0 - row["visible_share"]])
-        latent = self._remembered(row["entity_id"], time_s)
+        latent = self._latent.now(row["entity_id"], time_s)
         if ndtr(latent[4]) > expit(features @ noise.found):
             return None
         along_px = np.tile(sides_px, 2)
         outwards_px = noise.edge_bias * along_px + latent[:4] * np.hypot(noise.edge_share * along_px, noise.edge_px)
         score = float(expit(features @ noise.score + noise.score_sigma * latent[5]))
         cut = self._cut(box_px + outwards_px * [-1, -1, 1, 1])
-        return None if cut is None else (cut, float(np.clip(score, LEAST_SCORE, _SURE)), row["class_id"])
+        foot = self._foot(row, float(sides_px.max()), time_s)
+        return None if cut is None else (cut, float(np.clip(score, LEAST_SCORE, _SURE)), row["class_id"], foot)
 
-    def _remembered(self, entity_id: int, time_s: float) -> FloatArray:
-        """Return (6,) standard normal numbers that change slowly."""
-        fresh = self._rng.normal(size=_LATENT)
-        before_s, before = self._latent.get(entity_id, (-np.inf, fresh))
-        kept = float(np.exp((before_s - time_s) / self._memory_s))
-        latent: FloatArray = kept * before + np.sqrt(1.0 - kept**2) * fresh
-        self._latent[entity_id] = time_s, latent
-        return latent
+    def _foot(self, row: Row, longer_px: float, time_s: float) -> tuple[float, ...] | None:
+        """Return ground point, standard errors and covariance of one entity, as `_FOOT` names them."""
+        noise = self._point_noise.get(row["class_name"])
+        if noise is None:
+            return None
+        latent = self._point_latent.now(row["entity_id"], time_s)
+        sigma_px = np.array(noise.stated) * longer_px * np.exp(noise.spread * latent[2])
+        lasting, white = latent[:2], self._point_rng.normal(size=2)
+        shares = np.sqrt([1.0 - POINT_WHITE_SHARE, POINT_WHITE_SHARE])
+        off_px = np.array(noise.bias) * longer_px + (shares[0] * lasting + shares[1] * white) * noise.off * sigma_px
+        return row["foot_x_px"] + off_px[0], row["foot_y_px"] + off_px[1], *sigma_px.tolist(), 0.0
 
-    def _imagine(self) -> list[tuple[list[float], float, int]]:
+    def _imagine(self) -> list[_Look]:
         """Return detections of nothing."""
         imagined = []
         for site_class in CLASSES:
@@ -191,13 +232,31 @@ class NoisyDetector:
                 cut = self._cut(np.concatenate([middle_px - half_px, middle_px + half_px]))
                 score = float(np.clip(expit(self._rng.normal(*noise.false_score)), LEAST_SCORE, _SURE))
                 if cut is not None:
-                    imagined.append((cut, score, site_class.id))
+                    # Where a network puts the foot of nothing was not measured.
+                    imagined.append((cut, score, site_class.id, None))
         return imagined
 
     def _cut(self, box_px: FloatArray) -> list[float] | None:
         """Return a box cut at the picture's edge, or None when nothing worth a detection is left."""
         low, high = np.maximum(box_px[:2], -0.5), np.minimum(box_px[2:], self._size_px - 0.5)
         return [*low.tolist(), *high.tolist()] if (high - low >= _SMALLEST_PX).all() else None
+
+
+class _Remembered:
+    """Standard normal numbers of each entity that change slowly."""
+
+    def __init__(self, rng: np.random.Generator, count: int, memory_s: float) -> None:
+        self._rng, self._count, self._memory_s = rng, count, memory_s
+        self._last: dict[int, tuple[float, FloatArray]] = {}
+
+    def now(self, entity_id: int, time_s: float) -> FloatArray:
+        """Return (count,) numbers of an entity at a time not before the last."""
+        fresh = self._rng.normal(size=self._count)
+        before_s, before = self._last.get(entity_id, (-np.inf, fresh))
+        kept = float(np.exp((before_s - time_s) / self._memory_s))
+        numbers: FloatArray = kept * before + np.sqrt(1.0 - kept**2) * fresh
+        self._last[entity_id] = time_s, numbers
+        return numbers
 
 
 def size_of(sides_px: FloatArray) -> float:

@@ -239,9 +239,16 @@ def _excavators(rng: np.random.Generator, area: FilmedArea) -> Cast:
 
 
 def _machines(rng: np.random.Generator, area: FilmedArea) -> Cast:
-    """Machines of every kind but excavators, with some people."""
-    kinds = "spread", "roll", "doze", "drive"
-    return _packed(rng, area, lambda: _lone_machine(rng, area, kinds[int(rng.integers(len(kinds)))], _spot(rng, area)))
+    """Machines of every kind but excavators, with some people: half of them where they are, which takes less room."""
+    moving = "spread", "roll", "doze", "drive"
+
+    def draw() -> _Activity:
+        if rng.random() < 0.5:
+            return _lone_machine(rng, area, moving[int(rng.integers(len(moving)))], _spot(rng, area))
+        machine = _driving_machine(rng)
+        return [machine], [behaviour.idle(rng, machine, _spot(rng, area), area.duration_s)]
+
+    return _packed(rng, area, draw)
 
 
 def _packed(rng: np.random.Generator, area: FilmedArea, draw: Callable[[], _Activity]) -> Cast:

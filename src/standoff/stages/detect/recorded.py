@@ -12,8 +12,6 @@ from standoff.core.errors import DataError
 from standoff.core.types import Detections, Frame
 from standoff.files.fingerprint import file_sha256
 
-_SAME_TIME_S: Final = 1e-6
-"""Two readings of one timestamp differ by the rounding of a subtraction; two frames by a thousand times as much."""
 _FIX: Final = "choose --start, --stop and --every as in that run, or record the whole source"
 
 
@@ -113,10 +111,9 @@ class RecordedDetector(protocols.Detector):
                 found=self._extent(),
                 fix=_FIX,
             )
-        recorded_s = float(self._recorded.time_s[row])
-        if abs(recorded_s - frame.time_s) > _SAME_TIME_S:
+        if not self._recorded.is_at(row, frame.time_s):
             raise DataError(
-                expected=f"frame {frame.index} at {recorded_s:.6f} s as in {self._recorded.path} "
+                expected=f"frame {frame.index} at {self._recorded.time_s[row]:.6f} s as in {self._recorded.path} "
                 f"({self._source_name()})",
                 found=f"it at {frame.time_s:.6f} s",
                 fix="give the run of this source (with the same --fps), or detect anew",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import time
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ from typing import Any
 from standoff.clips import KeptLooks, part_path
 from standoff.core.types import Detections, Frame, FrameResult, Outcome
 from standoff.stages.sinks.params import TableParams
-from standoff.stages.sinks.parquet_parts import Columns, write_rows
+from standoff.stages.sinks.parquet_parts import WaitingRows, write_rows
 from standoff.stages.sinks.tables import detection_rows, detections_table
 
 
@@ -34,13 +33,11 @@ class LooksSink:
         detector: Mapping[str, Any],
         params: TableParams,
     ) -> None:
-        self._folder, self._kept, self._params = folder, kept, params
+        self._folder, self._kept = folder, kept
         self._schema = detections_table(source, detector).schema
         folder.mkdir(parents=True, exist_ok=True)
-        self._chunks: list[Columns] = []
+        self._waiting = WaitingRows(params.flush_s, params.flush_rows)
         self._frames: list[int] = []
-        self._rows = 0
-        self._flushed_s = time.monotonic()
 
     def write(self, result: FrameResult) -> None:
         """Keep what was seen in a frame; where the detector rested, nothing was."""
@@ -55,11 +52,9 @@ class LooksSink:
         """
         if self._kept.of(frame) is not None:
             return
-        self._chunks.append(detection_rows(frame, seen, detected=True))
+        self._waiting.add(detection_rows(frame, seen, detected=True))
         self._frames.append(frame.index)
-        self._rows += max(len(seen), 1)
-        is_due = time.monotonic() - self._flushed_s >= self._params.flush_s
-        if is_due or self._rows >= self._params.flush_rows:
+        if self._waiting.are_due:
             self.flush()
 
     def flush(self) -> None:
@@ -68,10 +63,11 @@ class LooksSink:
         Raises:
             OSError: There is no room.
         """
-        self._flushed_s = time.monotonic()
         if self._frames:
-            write_rows(part_path(self._folder, self._frames[0], self._frames[-1]), self._schema, self._chunks)
-            self._chunks, self._frames, self._rows = [], [], 0
+            path = part_path(self._folder, self._frames[0], self._frames[-1])
+            write_rows(path, self._schema, self._waiting.chunks)
+            self._frames = []
+        self._waiting.begin()
 
     def close(self, outcome: Outcome) -> None:
         """Remove all that is kept of the film where its run is complete; otherwise write the rest."""

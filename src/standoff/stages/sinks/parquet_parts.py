@@ -23,6 +23,43 @@ Columns = Mapping[str, Column]
 _ROW_GROUP_ROWS = 65_536
 
 
+class WaitingRows:
+    """Rows that are not written yet.
+
+    Args:
+        flush_s: Seconds of wall time since the last were written after which these are due.
+        flush_rows: Number of rows at which they are.
+
+    Attributes:
+        chunks: As they came.
+    """
+
+    def __init__(self, flush_s: float, flush_rows: int) -> None:
+        self._flush_s, self._flush_rows = flush_s, flush_rows
+        self.begin()
+
+    def begin(self) -> None:
+        """Begin anew: all that waited are written."""
+        self.chunks: list[Columns] = []
+        self._count = 0
+        self._begun_s = time.monotonic()
+
+    def __len__(self) -> int:
+        return self._count
+
+    def add(self, columns: Columns) -> None:
+        """Add one array or list for each column, all of one length."""
+        count = len(next(iter(columns.values())))
+        if count:
+            self.chunks.append(columns)
+            self._count += count
+
+    @property
+    def are_due(self) -> bool:
+        """Whether it is time to write them."""
+        return self._count >= self._flush_rows or time.monotonic() - self._begun_s >= self._flush_s
+
+
 class ParquetParts:
     """Collect rows; write a part now and then; make one file of all parts at the end.
 
@@ -38,10 +75,7 @@ class ParquetParts:
 
     def __init__(self, path: Path, schema: pa.Schema, *, flush_s: float, flush_rows: int) -> None:
         self._path, self._schema = path, schema
-        self._flush_s, self._flush_rows = flush_s, flush_rows
-        self._chunks: list[Columns] = []
-        self._rows = 0
-        self._flushed_at = time.monotonic()
+        self._waiting = WaitingRows(flush_s, flush_rows)
         self._parts: list[Path] = []
         self._is_whole = True
         self._folder = parts_folder(path)
@@ -49,23 +83,18 @@ class ParquetParts:
 
     def append(self, columns: Columns) -> None:
         """Add rows: one array or list for each column of the schema, all of one length; NaN becomes null."""
-        rows = len(columns[self._schema.names[0]])
-        if rows:
-            self._chunks.append(columns)
-            self._rows += rows
-        if self._rows >= self._flush_rows or time.monotonic() - self._flushed_at >= self._flush_s:
+        self._waiting.add(columns)
+        if self._waiting.are_due:
             self._flush()
 
     def _flush(self) -> None:
-        self._flushed_at = time.monotonic()
-        if not self._rows:
-            return
-        self._is_whole = False
-        part = self._folder / f"part-{len(self._parts):06d}.parquet"
-        write_rows(part, self._schema, self._chunks)
-        self._parts.append(part)
-        self._is_whole = True
-        self._chunks, self._rows = [], 0
+        if len(self._waiting):
+            self._is_whole = False
+            part = self._folder / f"part-{len(self._parts):06d}.parquet"
+            write_rows(part, self._schema, self._waiting.chunks)
+            self._parts.append(part)
+            self._is_whole = True
+        self._waiting.begin()
 
     def close(self) -> None:
         """Merge all parts under the final name and remove them.

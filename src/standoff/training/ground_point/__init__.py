@@ -5,7 +5,7 @@ a detector. What a detector's own heads learn slowly, because each thing is one 
 learns in less than an hour on one core.
 """
 
-from standoff.training.ground_point.crops import Patches, read_patches
+from standoff.training.ground_point.crops import Patches, as_found, read_patches
 from standoff.training.ground_point.network import read_eyes
 from standoff.training.ground_point.train import (
     PointError,
@@ -19,6 +19,7 @@ __all__ = [
     "Patches",
     "PointError",
     "PointTraining",
+    "as_found",
     "measure_points",
     "read_eyes",
     "read_patches",

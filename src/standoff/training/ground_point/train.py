@@ -193,19 +193,17 @@ def _of_class(told: Tensor, class_index: Tensor) -> Tensor:
     return told.gather(1, class_index.reshape(-1, 1, 1).expand(-1, 1, 4)).squeeze(1)
 
 
-def measure_points(network: GroundPointNetwork, patches: Patches, seed: int = 0) -> list[PointError]:
-    """Say how far off the network is on crops that it did not learn from, boxed as a detector does, class by class.
+def measure_points(network: GroundPointNetwork, patches: Patches) -> list[PointError]:
+    """Say how far off the network is on crops that it did not learn from, class by class.
 
     Args:
         network: Trained.
-        patches: Not learnt from.
-        seed: Of the boxes.
+        patches: Not learnt from, in boxes as a detector finds them (`as_found`).
     """
-    rng = np.random.default_rng(seed)
     off, sigmas = np.zeros(len(patches)), np.zeros(len(patches))
     for start in range(0, len(patches), 256):
         rows = np.arange(start, min(start + 256, len(patches)))
-        crops, true = zip(*(boxed_crop(rng, patches.images[k], patches.point[k]) for k in rows), strict=True)
+        crops, true = zip(*(boxed_crop(patches.images[k], patches.point[k]) for k in rows), strict=True)
         told = _told(network, np.array(crops)[..., ::-1], patches.class_index[rows])
         away = told[:, :2] - np.array(true)
         off[rows] = POINT_CROP_AROUND * np.linalg.norm(away, axis=1)
