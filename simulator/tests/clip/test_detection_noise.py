@@ -123,6 +123,7 @@ def test_the_same_generator_finds_the_same() -> None:
     assert _found(NOISE, _worker(), 4) != _found(NOISE, _worker(), 5)
 
 
+_NO_POINTS: Mapping[str, PointNoise] = {}
 _POINTS = {"worker": PointNoise((0.1, 0.05), 0.5, (0.02, -0.04), (0.5, 2.0))}
 _ALL_FOUND = _NONE_FALSE | {"worker": replace(_NONE_FALSE["worker"], found=(50.0, 0, 0))}
 
@@ -156,8 +157,9 @@ def test_a_part_of_a_points_error_is_another_in_every_frame_and_the_rest_goes_on
 def test_boxes_are_the_same_whether_there_are_points_or_not() -> None:
     with_points, without = (
         NoisyDetector(_SIZE_PX, np.random.default_rng(10), point_noise=points).detect(0, 0.0, [_worker()] * 3)
-        for points in (POINT_NOISE | _POINTS, {})
+        for points in (POINT_NOISE, _NO_POINTS)
     )
     assert [row["score"] for row in with_points] == [row["score"] for row in without]
     np.testing.assert_array_equal(_boxes(with_points), _boxes(without))
+    assert any(row["foot_x_px"] is not None for row in with_points)
     assert all(row["foot_x_px"] is None for row in without)
