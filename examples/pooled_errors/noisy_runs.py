@@ -13,9 +13,8 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 
-from standoff.clips import FOOT_COLUMNS
+from standoff.clips import NOISY_DETECTIONS_FILE, detections_of
 from standoff.core import homography, protocols
-from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.homography import FloatArray
 from standoff.core.pose import LENS, SHIFT, TURN, View
 from standoff.core.types import CameraMotion, Detections, Frame, GroundMap, NoCameraMotion
@@ -34,7 +33,6 @@ from standoff_sim.clip.write_clip import record_truth
 
 _TURN_RAD, _SHIFT_M, _FOCAL = 0.003, 0.1, 0.005
 """Standard errors of the view: some decimetres on the ground, 30 m away."""
-_BOX = ("x1_px", "y1_px", "x2_px", "y2_px")
 
 
 class _Views(protocols.Source, protocols.Detector):
@@ -49,16 +47,10 @@ class _Views(protocols.Source, protocols.Detector):
             View(camera, np.array(place), np.array(turn).reshape(3, 3))
             for place, turn in zip(places, frames["site_to_camera"], strict=True)
         ]
-        rows = pq.read_table(clip / "detections.parquet").to_pydict()
-        self._frame_of = np.array(rows["frame"], dtype=np.int64)
-        class_id = [CLASS_BY_NAME[name].id for name in rows["class"]]
-        boxes_px = np.array([rows[side] for side in _BOX], dtype=np.float64).T
-        foot = {name: np.array(rows[name], dtype=np.float64) for name, *_ in FOOT_COLUMNS}
-        foot_px = np.column_stack([foot["foot_x_px"], foot["foot_y_px"]])
-        x_px2, y_px2, both_px2 = foot["foot_sigma_x_px"] ** 2, foot["foot_sigma_y_px"] ** 2, foot["foot_cov_px2"]
-        spread_px2 = np.stack([x_px2, both_px2, both_px2, y_px2], axis=1).reshape(-1, 2, 2)
-        scores, class_ids = np.array(rows["score"]), np.array(class_id, dtype=np.int64)
-        self._found = Detections(boxes_px, scores, class_ids, foot_px, spread_px2)
+        file = clip / NOISY_DETECTIONS_FILE
+        table = pq.read_table(file)
+        self._frame_of = table.column("frame").to_numpy()
+        self._found = detections_of(table, file)
         sigma = np.zeros(8)
         sigma[TURN], sigma[SHIFT], sigma[LENS] = _TURN_RAD, _SHIFT_M, (_FOCAL, 0.0)
         self._covariance = np.diag(sigma**2)

@@ -21,7 +21,7 @@ PUBLIC_NAMES = {
         "NOISY_DETECTIONS_FILE", "NOISY_DETECTIONS_SCHEMA", "PAIRS_FILE", "PAIRS_SCHEMA", "REFERENCE_FILE",
         "RENDER_AGAIN", "RecordedDetections", "RunFolder", "RunTable", "SCENE_FILE", "TELEMETRY_FILE", "TRUTH_FILE",
         "TRUTH_FILES", "TRUTH_NUMBERS", "TRUTH_SCHEMA", "TrueBoard", "TrueReference", "VIDEO_FILE", "chosen_rows",
-        "columns_of", "is_recording", "load_clip", "map_of", "map_values",
+        "columns_of", "detections_of", "is_recording", "load_clip", "map_of", "map_values",
         "metadata_of", "read_clip_table", "read_columns",
         "read_detections", "read_scene", "schema_of",
     "KeptLooks", "part_path"},

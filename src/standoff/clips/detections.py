@@ -165,7 +165,7 @@ def read_detections(path: Path | str) -> RecordedDetections:
         time_s=by_row["time_s"][first_row],
         detected=by_row["detected"][first_row],
         first=rows_seen[np.append(first_row, len(seen))],
-        detections=_detections(table.filter(pa.array(seen)), file),
+        detections=detections_of(table.filter(pa.array(seen)), file),
     )
 
 
@@ -238,8 +238,16 @@ def _check_frames(by_row: Mapping[str, Any], first_row: IntArray, count: IntArra
         raise _broken("a row without a box only where it is the frame's only one", file)
 
 
-def _detections(table: pa.Table, file: Path) -> Detections:
-    """Return the rows of a table without nulls as detections."""
+def detections_of(table: pa.Table, file: Path) -> Detections:
+    """Return the rows of a table as detections.
+
+    Args:
+        table: With boxes, scores and classes, none of them null; ground points may be null, or not there.
+        file: Where it was read, for what is said of mistakes.
+
+    Raises:
+        DataError: It is not such a table.
+    """
     columns = {name: _column(table, name, kind, file) for name, kind, _, _ in _BOX}
     names, index = np.unique(columns["class"].astype(str), return_inverse=True)
     unknown = sorted(set(names.tolist()) - set(CLASS_BY_NAME))

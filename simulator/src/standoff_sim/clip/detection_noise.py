@@ -140,8 +140,8 @@ last number of `found` and `score` is a weak prior more than a measurement for a
 """
 
 POINT_MEMORY_S = 5.0
-"""Time after which the part of a ground point's error that lasts is forgotten to 1/e: on those films half of what two
-frames 0.2 s apart share is left after some three seconds."""
+"""Time after which the part of a ground point's error that lasts is forgotten to 1/e: in the films of `POINT_NOISE`
+half of what two frames 0.2 s apart share is left after some three seconds."""
 POINT_WHITE_SHARE = 0.3
 """Share of its variance that is another in every frame."""
 

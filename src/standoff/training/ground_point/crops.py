@@ -29,7 +29,7 @@ _BOX_SHIFT: Final = 0.045
 shipped detector's of workers and excavators are off by 0.11 to 0.13 and 0.03 to 0.045 in six simulated clips."""
 _LEAST_BOX_PX: Final = 8.0
 _FOUND_SCORE: Final = 0.3
-"""What is found less surely is in no track."""
+"""What is found less surely starts no track."""
 _FOUND_OVERLAP: Final = 0.4
 _FARTHEST_SIDES: Final = 1.0
 """A point further from the middle of its crop, in sides of it, tells of a thing that is hardly in the picture."""
