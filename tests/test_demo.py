@@ -99,7 +99,10 @@ def test_the_films_danger_is_recognised_at_few_frames_a_second(every: int, tmp_p
     settings = load_settings(FILM / "reference.yaml", {"source": {"every": every}, "outputs": ()})
     events = [event for result in open_run(FILM / "video.mp4", tmp_path / "out", settings) for event in result.hazards]
     assert "danger" in {event.severity for event in events}
-    assert len({event.hazard_id for event in events if event.rule == "proximity"}) == 2
+    near = [event for event in events if event.rule == "proximity"]
+    assert len({event.hazard_id for event in near if len(event.track_ids) == 2}) == 2
+    # Near the excavator, which nobody walks to, stands what the detector is not sure of.
+    assert {event.severity for event in near if len(event.track_ids) == 1} <= {"unknown"}
     # A worker has 44 pixels of the detector's input, and nine of ten are found from 60 on: that is said once.
     streams = [event.reason for event in events if event.rule == "measurement" and event.phase == "opened"]
     assert streams in ([], ["no ground is watched: workers would be too small"])

@@ -31,7 +31,8 @@ from standoff.scale import (
     write_overview,
     write_tables,
 )
-from standoff.scale.pool import Machines, connected
+from standoff.scale.connection import connected
+from standoff.scale.pool import Machines
 
 SLEEP_S = 1.0
 FILMS_A_PROCESS = 6
@@ -55,8 +56,8 @@ def overhead() -> None:
     """Print what Ray adds to films that sleep, by the number of processes."""
     print("processes   films   until all processes run, s   the films, s   of it sleep, s   added to each film, ms")
     for processes in PROCESSES:
-        with connected(None, cores=processes) as ray:
-            machines = Machines(ray, 1, sleeping)
+        with connected(None, cores=processes) as connection:
+            machines = Machines(connection, 1, sleeping)
             begun_s, running = time.monotonic(), set[int]()
             # A process that starts early takes what was meant for a late one.
             while len(running) < processes:
@@ -102,11 +103,11 @@ def long_list() -> None:
         begun_s = time.monotonic()
         plans = plan_films(find_films([films]), out, load_settings())
         _say(f"{len(plans)} films planned in {time.monotonic() - begun_s:.1f} s")
-        with connected(None) as ray:
+        with connected(None) as connection:
             _say("Ray connected")
             begun_s = time.monotonic()
             results = []
-            for result in Machines(ray, 1, found_at_once).watch(plans):
+            for result in Machines(connection, 1, found_at_once).watch(plans):
                 results.append(result)
                 if len(results) % SAID_EVERY == 0:
                     _say(f"{len(results)} results after {time.monotonic() - begun_s:.1f} s")
@@ -124,8 +125,8 @@ def _say(what: str) -> None:
 def same_films(folder: Path, config: Path) -> None:
     """Print how long the same films take one at a time and two at a time, one core each."""
     for processes in (1, 2):
-        with tempfile.TemporaryDirectory() as out, connected(None, cores=processes) as ray:
-            machines = Machines(ray, 1)
+        with tempfile.TemporaryDirectory() as out, connected(None, cores=processes) as connection:
+            machines = Machines(connection, 1)
             plans = plan_films(find_films([folder]), Path(out), load_settings(config))
             # Processes start, and load what they need, with the first films.
             started_s = _took_s(machines.watch(plans[:processes]))
@@ -141,16 +142,16 @@ def in_parts(film: Path, settings: Settings) -> None:
     """Print how long a film takes as a whole, and looked at in parts by two processes."""
     first_second = settings.model_copy(update={"source": replace(settings.source, stop_s=1.0)})
     looked_s: list[float] = []
-    with tempfile.TemporaryDirectory() as out, connected(None, cores=2) as ray:
+    with tempfile.TemporaryDirectory() as out, connected(None, cores=2) as connection:
         start, whole, divided = (
             plan_films([film], Path(out) / name, own)
             for name, own in (("start", first_second), ("whole", settings), ("parts", settings))
         )
         # Processes start, and load what they need, with the first parts.
-        _took_s(Machines(ray, 1, part_s=0.5).watch(start))
-        whole_s = _took_s(Machines(ray, 1).watch(whole))
+        _took_s(Machines(connection, 1, part_s=0.5).watch(start))
+        whole_s = _took_s(Machines(connection, 1).watch(whole))
         begun_s = time.monotonic()
-        machines = Machines(ray, 1, part_s=PART_S, on_part=lambda _: looked_s.append(time.monotonic()))
+        machines = Machines(connection, 1, part_s=PART_S, on_part=lambda _: looked_s.append(time.monotonic()))
         in_parts_s = _took_s(machines.watch(divided))
     print(
         f"{film.name}: as a whole {whole_s:.1f} s; in {len(looked_s)} parts {in_parts_s:.1f} s, of which "

@@ -19,7 +19,8 @@ import numpy as np
 import numpy.typing as npt
 import pyarrow.parquet as pq
 from scipy.optimize import minimize
-from scipy.special import logit
+from scipy.special import expit, logit, ndtri
+from scipy.stats import multivariate_normal
 
 from standoff.core.boxes import areas_px2, shared_px2
 from standoff.core.classes import CLASSES
@@ -31,6 +32,7 @@ from standoff_sim.clip.detection_noise import GROUPS, ClassNoise, size_of
 
 IntArray = npt.NDArray[np.int64]
 Tracks = dict[tuple[str, int], list[tuple[float, FloatArray]]]
+Looks = dict[tuple[str, int], list[tuple[float, str, list[float], bool]]]
 
 MATCH_IOU = 0.4
 LEAST_PX = 16
@@ -41,6 +43,8 @@ USUAL_FOUND, USUAL_SCORE = np.array([0.0, 1.0, -3.0]), np.array([0.0, 0.5, -2.0]
 """More is found, and surer, of what is large and in full view; the first entry is free."""
 TILES = (1, 2, 3)
 """Pictures are looked at as they are, and as tilings of themselves: everything is as small as from further away."""
+LAGS_S = (0.2, 1.0, 3.0)
+"""How much later it is looked whether who was missed is missed still."""
 SIDES = ("x1_px", "y1_px", "x2_px", "y2_px")
 
 
@@ -64,6 +68,7 @@ class Collector:
     Attributes:
         samples: By group of classes.
         tracks: Edge errors of each entity of each clip, as shares of its sides, with their times.
+        looks: Whether each entity of each clip was found, with its time, its group and its features.
         frames: Number of frames.
     """
 
@@ -71,6 +76,7 @@ class Collector:
         self._detector = detector
         self.samples = {group: Sample() for group in dict.fromkeys(GROUPS.values())}
         self.tracks: Tracks = defaultdict(list)
+        self.looks: Looks = defaultdict(list)
         self.frames = 0
 
     def add(self, clip: Path) -> None:
@@ -101,19 +107,22 @@ class Collector:
                 find = pairs.get(number)
                 box_px = None if find is None else found.xyxy_px[find] - offset
                 score = 0.0 if find is None else float(found.score[find])
-                track = self.tracks[clip, row["entity_id"]] if tiles == 1 else None
-                self._add_truth(row, boxes_px[number], box_px, score, track, frame.time_s)
+                entity = (clip, row["entity_id"]) if tiles == 1 else None
+                self._add_truth(row, boxes_px[number], box_px, score, entity, frame.time_s)
             if tiles == 1:
                 self._add_false(found[~np.isin(np.arange(len(found.score)), list(pairs.values()))])
 
     def _add_truth(
         self, row: dict[str, Any], truth_px: FloatArray, found_px: FloatArray | None, score: float,
-        track: list[tuple[float, FloatArray]] | None, time_s: float,
+        entity: tuple[str, int] | None, time_s: float,
     ) -> None:  # fmt: skip
-        sample, sides_px = self.samples[GROUPS[row["class_name"]]], truth_px[2:] - truth_px[:2]
+        group = GROUPS[row["class_name"]]
+        sample, sides_px = self.samples[group], truth_px[2:] - truth_px[:2]
         features = [1.0, size_of(sides_px), 1.0 - row["visible_share"]]
         sample.features.append(features)
         sample.found.append(found_px is not None)
+        if entity is not None:
+            self.looks[entity].append((time_s, group, features, found_px is not None))
         if found_px is None:
             return
         outwards_px = (found_px - truth_px) * [-1, -1, 1, 1]
@@ -121,8 +130,8 @@ class Collector:
         sample.sides.append(np.tile(sides_px, 2))
         sample.logits.append(log_odds(score))
         sample.found_features.append(features)
-        if track is not None:
-            track.append((time_s, outwards_px / np.tile(sides_px, 2)))
+        if entity is not None:
+            self.tracks[entity].append((time_s, outwards_px / np.tile(sides_px, 2)))
 
     def _add_false(self, false: Detections) -> None:
         for box_px, score, class_id in zip(false.xyxy_px, false.score, false.class_id, strict=True):
@@ -200,11 +209,45 @@ def memory_s(tracks: Tracks) -> float:
     return float(-np.median(gaps) / np.log(kept))
 
 
-def summarised(sample: Sample, frames: int, classes: int) -> ClassNoise:
-    """Return the row of the table for one group."""
+def miss_memory_s(looks: Looks, odds: dict[str, FloatArray]) -> float:
+    """Return the time after which a miss is forgotten to 1/e, by what is found again `LAGS_S` later.
+
+    Args:
+        looks: Of each entity.
+        odds: By group, coefficients of the log odds of being found.
+    """
+    limits, found, gaps_s = [], [], []
+    for entity in looks.values():
+        for row, (time_s, group, features, is_found) in enumerate(entity):
+            for later_s, _, later_features, is_found_later in entity[row + 1 :]:
+                if any(abs(later_s - time_s - lag_s) < 0.05 for lag_s in LAGS_S):
+                    limits.append(np.clip(np.array([features, later_features]) @ odds[group], -6.0, 6.0))
+                    found.append((is_found, is_found_later))
+                    gaps_s.append(round(later_s - time_s, 1))
+    limit, seen, gap_s = ndtri(expit(np.array(limits))), np.array(found), np.array(gaps_s)
+
+    def likelihood(memory_s: float) -> float:
+        total = 0.0
+        for lag_s in np.unique(gap_s):
+            rows, kept = gap_s == lag_s, np.exp(-lag_s / memory_s)
+            # Whoever is missed is beyond the limit: the other side of it.
+            side = np.where(seen[rows], 1.0, -1.0)
+            alike = kept * side.prod(axis=1)
+            for sign in (-1.0, 1.0):
+                of = np.sign(alike) == sign
+                if of.any():
+                    covariance = [[1.0, sign * kept], [sign * kept, 1.0]]
+                    chance = multivariate_normal(cov=covariance).cdf((limit[rows] * side)[of])
+                    total += float(np.log(np.maximum(chance, 1e-6)).sum())
+        return total
+
+    return float(max(np.geomspace(0.1, 100.0, 31), key=likelihood))
+
+
+def summarised(sample: Sample, found: FloatArray, frames: int, classes: int) -> ClassNoise:
+    """Return the row of the table for one group, whose coefficients of being found are known."""
     bias, shares, px = fit_edges(np.array(sample.edges), np.array(sample.sides))
     scores, sigma = fit_scores(np.array(sample.found_features), np.array(sample.logits))
-    found = fit_odds(np.array(sample.features), np.array(sample.found, float))
     sizes, logits = np.array(sample.false_sizes), np.array(sample.false_logits)
     if len(sizes) < 3:
         sizes, logits = np.append(sizes, [0.0, 1.0, 2.0]), np.append(logits, [-2.0, -1.5, -1.0])
@@ -227,11 +270,17 @@ def main() -> None:
     for clip in arguments.clips:
         collector.add(clip)
     print(f"# {collector.frames} frames\nMEMORY_S = {memory_s(collector.tracks):.2f}")
+    odds = {
+        group: fit_odds(np.array(sample.features), np.array(sample.found, float))
+        for group, sample in collector.samples.items()
+        if sample.found
+    }
+    print(f"MISS_MEMORY_S = {miss_memory_s(collector.looks, odds):.2f}")
     for group, sample in collector.samples.items():
         classes = list(GROUPS.values()).count(group)
         print(f"# {group}: {len(sample.found)} truths, {sum(sample.found)} found, {len(sample.false_sizes)} false")
         if sample.edges:
-            print(f'"{group}": {summarised(sample, collector.frames, classes)},')
+            print(f'"{group}": {summarised(sample, odds[group], collector.frames, classes)},')
 
 
 if __name__ == "__main__":

@@ -7,18 +7,22 @@ motion of the picture is exact. Tracks, places and distances are the stages' own
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
 
-from standoff.clips import NOISY_DETECTIONS_FILE, detections_of
+from standoff.clips import NOISY_DETECTIONS_FILE, detections_of, load_clip
+from standoff.config import load_settings
 from standoff.core import homography, protocols
 from standoff.core.homography import FloatArray
 from standoff.core.pose import LENS, SHIFT, TURN, View
 from standoff.core.types import CameraMotion, Detections, Frame, GroundMap, NoCameraMotion
 from standoff.evaluation.coverage import ClipSamples, read_samples
+from standoff.evaluation.paper.answers import FrameByFrame, score_frames
+from standoff.evaluation.paper.monitored_clip import Notes
+from standoff.evaluation.run_frames import RunFrame
 from standoff.monitor import Monitor, Run
 from standoff.stages.frames import ArrayPicture
 from standoff.stages.ground import load_camera, map_from_view
@@ -99,7 +103,20 @@ class _Ground(protocols.Ground):
         return self._views.mapped(frame)
 
 
-def samples_of(preset: str, seed: int, folder: Path, *, frames: int, clutter: float | None = None) -> ClipSamples:
+@dataclass(frozen=True, slots=True, eq=False)
+class NoisyRun:
+    """What was measured of one clip.
+
+    Attributes:
+        samples: Distances beside the true ones.
+        answers: Danger, warning, clear or unknown in every frame, beside what is true.
+    """
+
+    samples: ClipSamples
+    answers: FrameByFrame
+
+
+def run_noisily(preset: str, seed: int, folder: Path, *, frames: int, clutter: float | None = None) -> NoisyRun:
     """Make a clip, run everything after the detector on it, and compare.
 
     Args:
@@ -109,21 +126,25 @@ def samples_of(preset: str, seed: int, folder: Path, *, frames: int, clutter: fl
         frames: Five a second.
         clutter: In place of the preset's own; most of a site's making is what lies about.
     """
-    clip, run = folder / f"{preset}-{seed}", folder / f"run-{preset}-{seed}"
+    folder_of_clip, run = folder / f"{preset}-{seed}", folder / f"run-{preset}-{seed}"
     plan = plan_clip(preset, seed=seed, frames=frames, fps=5.0, width_px=1280, height_px=720)
     if clutter is not None:
         plan = replace(plan, preset=replace(plan.preset, clutter=clutter))
-    record_truth(plan, clip, processes=1)
+    record_truth(plan, folder_of_clip, processes=1)
     run.mkdir()
-    views = _Views(clip, seed)
+    views = _Views(folder_of_clip, seed)
     tables = {"tracks": ZONED_TRACKS, "proximity": PROXIMITY, "frames": FRAMES}
     sinks = {name: TableSink(run / f"{name}.parquet", table) for name, table in tables.items()}
     monitor = Monitor(
         detector=views, motion=_Motion(views), ground=_Ground(views), tracker=Tracker(),
         locator=Locator(), watcher=GroundWatcher(), proximity=ProximityMeter(), hazard=HazardMonitor(),
     )  # fmt: skip
+    clip = load_clip(folder_of_clip, with_film=False)
+    settings = load_settings(clip.settings_file)
+    assert settings.ground.reference is not None
+    notes = Notes(clip, settings.ground.reference.shape(), views.size_px, true_ids=False)
     noisy = Run(views, monitor, sinks)
-    for _ in noisy:
-        pass
+    for result in noisy:
+        notes.take(RunFrame.of_result(result))
     assert not noisy.sink_errors
-    return read_samples(run, clip)
+    return NoisyRun(read_samples(run, folder_of_clip), score_frames(clip, notes.monitored, settings))

@@ -94,7 +94,9 @@ PUBLIC_NAMES = {
     "standoff.stages.hazard": {"HazardMonitor", "HazardParams"},
     "standoff.stages.locate": {"Anchor", "LocateParams", "Locator"},
     "standoff.stages.motion": {"MotionEstimator", "MotionParams"},
-    "standoff.stages.proximity": {"Excuses", "ProximityMeter", "ProximityParams", "side_classes"},
+    "standoff.stages.proximity": {
+        "Excuses", "ProximityMeter", "ProximityParams", "machines_near_people", "side_classes",
+    },
     "standoff.stages.sinks": {
         "Composer", "DETECTIONS", "DrawParams", "FRAMES", "FrameMeasurements", "HazardSink", "PROXIMITY",
         "ReportParams", "ReportSink", "ShowParams", "TRACKS", "Table", "TableParams", "TableSink", "VideoParams",

@@ -73,6 +73,14 @@ def test_a_folder_that_is_no_clip_is_refused_in_one_line(
     assert "\n" not in str(refused.value)
 
 
+def test_a_clip_without_a_film_is_read_where_none_is_asked_for(copy_of: Path) -> None:
+    with_film = load_clip(copy_of)
+    (copy_of / "video.mp4").unlink()
+    with pytest.raises(DataError, match=r"video\.mp4"):
+        load_clip(copy_of)
+    np.testing.assert_array_equal(load_clip(copy_of, with_film=False).distance_m, with_film.distance_m)
+
+
 def test_pairs_without_a_true_distance_are_left_out(copy_of: Path) -> None:
     table = pq.read_table(copy_of / "pairs.parquet")
     rows = np.arange(len(table))

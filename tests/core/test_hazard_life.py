@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
@@ -57,3 +58,11 @@ def test_what_is_open_lasts_to_the_end_of_the_run() -> None:
     life = life_of([event(2.0, "warning", 0.5, "opened"), event(3.0, "danger", -1.0)])
     assert life.lasted_s(10.0) == pytest.approx(8.0)
     assert life.who == "worker and excavator"
+
+
+def test_a_machine_alone_is_near_somebody_whom_nobody_follows() -> None:
+    opened = replace(event(2.0, "unknown", math.nan, "opened", "somebody may stand near it"), track_ids=(4,))
+    assert HazardLife.begun(opened, ("excavator 4",)).who == "excavator 4 and perhaps somebody"
+    in_zone = replace(opened, rule="zone", zone="pit")
+    assert HazardLife.begun(in_zone, ("excavator 4",)).who == "excavator 4: zone pit"
+    assert HazardLife.begun(replace(opened, rule="measurement", track_ids=()), ()).who == "whole picture (measurement)"

@@ -91,6 +91,14 @@ def test_indexing_returns_the_same_type_with_those_rows(rows_type: type[Any], ma
 
 
 @pytest.mark.parametrize("rows_type", _TYPES)
+def test_one_row_alone_or_rows_of_rows_are_refused(rows_type: type[Any]) -> None:
+    rows = rows_type(**_ROWS[rows_type])
+    for wrong in (0, np.array([[0, 1]])):
+        with pytest.raises(ValueError, match="takes a mask"):
+            rows[wrong]
+
+
+@pytest.mark.parametrize("rows_type", _TYPES)
 def test_empty_has_no_rows_and_whole_shapes(rows_type: type[Any]) -> None:
     empty, full = rows_type.empty(), rows_type(**_ROWS[rows_type])
     assert len(empty) == 0

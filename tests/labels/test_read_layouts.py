@@ -71,6 +71,20 @@ def test_what_supervision_writes_and_reads_is_what_we_read(tmp_path: Path, layou
     _assert_same(data, original)
 
 
+@pytest.mark.parametrize("linked", [("images", "labels"), ("images",), ("labels",)])
+def test_a_set_whose_folders_are_links_is_read_as_the_set_itself(tmp_path: Path, linked: tuple[str, ...]) -> None:
+    there, here = tmp_path / "there", tmp_path / "here"
+    write_yolo(there, {"a-01": "0 0.5 0.5 0.2 0.2", "b-01": "1 0.5 0.5 0.4 0.2"}, ["worker", "excavator"])
+    here.mkdir()
+    for one in there.iterdir():
+        if one.name in linked:
+            (here / one.name).symlink_to(one)
+        else:
+            one.rename(here / one.name)
+    pictures = by_stem(read_data(here))
+    assert {name: picture.class_id.tolist() for name, picture in pictures.items()} == {"a-01": [0], "b-01": [1]}
+
+
 def test_the_simulators_lines_come_back_as_its_boxes(tmp_path: Path) -> None:
     row = {"class_id": 2, "x1_px": -0.5, "y1_px": 3.5, "x2_px": 11.5, "y2_px": 29.5}
     write_yolo(tmp_path, {"9-00004-05": yolo_line(row, (40, 30))}, [site_class.name for site_class in CLASSES])

@@ -99,6 +99,24 @@ def test_the_film_of_a_killed_process_is_run_again(films: Path, tmp_path: Path) 
     assert_same(tmp_path / "out" / "second", monitor(films / "second.mp4", site, tmp_path / "alone"))
 
 
+def test_where_ray_itself_dies_it_is_begun_anew_and_all_films_are_watched(films: Path, tmp_path: Path) -> None:
+    slow = {"factory": "scale.slow_detectors:Slow", "options": {"words": str(tmp_path / "words"), "frame_s": 0.1}}
+    site = write_site(tmp_path, outputs=[*TABLES, "hazards"], replace={"detect": slow})
+
+    def kill_raylet() -> None:
+        until(lambda: bool(machines(tmp_path / "words")), "a film is watched")
+        raylet = next(iter(machines(tmp_path / "words").values()))
+        assert "raylet" in Path(f"/proc/{raylet}/cmdline").read_text()
+        os.kill(raylet, signal.SIGKILL)
+
+    with ThreadPoolExecutor(1) as beside:
+        done = beside.submit(kill_raylet)
+        code, results, err = batch(films, site)
+        done.result()
+    assert (code, err, outcomes(results)) == (0, "", ALL_COMPLETE)
+    assert_same(tmp_path / "out" / "first", monitor(films / "first.mp4", site, tmp_path / "alone"))
+
+
 def free_port() -> int:
     with socket.create_server(("127.0.0.1", 0)) as server:
         return int(server.getsockname()[1])

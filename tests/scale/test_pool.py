@@ -14,7 +14,8 @@ import ray.exceptions
 
 from standoff.config import Settings
 from standoff.core.errors import ConfigError
-from standoff.scale import FilmPart, FilmPlan, FilmResult, pool, watch_films
+from standoff.scale import FilmPart, FilmPlan, FilmResult, connection, pool, watch_films
+from standoff.scale.connection import Connection
 
 Act = Callable[[FilmPlan], FilmResult]
 ERRORS: Any = ray.exceptions
@@ -71,7 +72,7 @@ class Plan(FilmPlan):
 
 
 def watched(scripted: ScriptedRay, count: int, cores_per_film: int = 2) -> dict[str, FilmResult]:
-    results = pool.Machines(scripted, cores_per_film).watch(plans(count))
+    results = pool.Machines(Connection(scripted), cores_per_film).watch(plans(count))
     return {one.film.stem: one for one in results}
 
 
@@ -92,6 +93,30 @@ def test_a_film_that_kills_its_process_or_meets_a_fault_is_named_and_the_others_
     assert results["3"].message == "ZeroDivisionError: in a stage of mine"
 
 
+def ray_dies(plan: FilmPlan) -> FilmResult:
+    raise ERRORS.LocalRayletDiedError
+
+
+@pytest.mark.parametrize("deaths", [1, 3, 9])
+def test_a_ray_of_our_own_that_dies_is_begun_anew_as_often_as_a_film_is(deaths: int) -> None:
+    scripted, restarts = ScriptedRay({"1": ray_dies}), []
+
+    def restart() -> None:
+        restarts.append(1)
+        if len(restarts) == deaths:
+            del scripted.script["1"]
+
+    results = {one.film.stem: one for one in pool.Machines(Connection(scripted, restart), 2).watch(plans(5))}
+    assert {name: one.status for name, one in results.items()} == {
+        "0": "complete", "1": "complete" if deaths < 4 else "failed", "2": "complete", "3": "complete", "4": "complete",
+    }  # fmt: skip
+    assert len(restarts) == min(deaths, 3)
+
+
+def test_a_cluster_is_not_begun_anew() -> None:
+    assert watched(ScriptedRay({"1": ray_dies}), 3)["1"].message.startswith("its process was lost 4 times: ")
+
+
 @pytest.mark.parametrize(
     ("cores", "per_film", "places"), [((2,), 2, 1), ((8, 4), 2, 6), ((1, 1), 4, 2), ((5, 0), 3, 1)]
 )
@@ -106,7 +131,7 @@ def test_films_left_without_a_machine_fail_by_name(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(pool, "_NO_MACHINE_S", 0.0)
     monkeypatch.setattr(pool, "_LOOKS_EVERY_S", 0.0)
     scripted = ScriptedRay(cores=(2,))
-    machines = pool.Machines(scripted, 2)
+    machines = pool.Machines(Connection(scripted), 2)
     results = machines.watch(plans(3))
     assert next(results).status == "complete"
     scripted.cores = ()
@@ -117,11 +142,11 @@ def test_films_left_without_a_machine_fail_by_name(monkeypatch: pytest.MonkeyPat
 
 def test_a_cluster_without_cores_is_refused() -> None:
     with pytest.raises(ConfigError, match="machines that have cores"):
-        pool.Machines(ScriptedRay(cores=(0,)), 2)
+        pool.Machines(Connection(ScriptedRay(cores=(0,))), 2)
 
 
 def test_a_port_at_which_nobody_speaks_rays_language_is_given_up_in_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(pool, "ANSWERS_WITHIN_S", 1.0)
+    monkeypatch.setattr(connection, "ANSWERS_WITHIN_S", 1.0)
     with socket.create_server(("127.0.0.1", 0)) as silent:
         begun_s = time.monotonic()
         with pytest.raises(ConfigError, match="expected a Ray cluster at ray"):
@@ -169,7 +194,7 @@ def test_a_long_film_is_watched_once_all_its_parts_were_looked_at_or_given_up(
     monkeypatch.setattr(pool, "parts_of", in_parts)
     told: list[FilmPart] = []
     scripted = ScriptedParts(cores=(2, 2), deadly=deadly)
-    results = pool.Machines(scripted, 2, part_s=10.0, on_part=told.append).watch(plans(5))
+    results = pool.Machines(Connection(scripted), 2, part_s=10.0, on_part=told.append).watch(plans(5))
     assert sorted(one.film.stem for one in results if one.status == "complete") == ["0", "1", "2", "3", "4"]
     for film, count in (("1", 5), ("3", 2)):
         order = [start_s for name, start_s in scripted.done if name == film]
@@ -183,7 +208,7 @@ def test_a_long_film_is_watched_once_all_its_parts_were_looked_at_or_given_up(
 def test_one_place_looks_at_no_film_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pool, "parts_of", in_parts)
     scripted = ScriptedParts(cores=(2,))
-    assert len(list(pool.Machines(scripted, 2, part_s=10.0).watch(plans(5)))) == 5
+    assert len(list(pool.Machines(Connection(scripted), 2, part_s=10.0).watch(plans(5)))) == 5
     assert all(start_s is None for _, start_s in scripted.done)
 
 
@@ -192,7 +217,7 @@ def test_parts_left_without_a_machine_end_as_failed_films(monkeypatch: pytest.Mo
     monkeypatch.setattr(pool, "_NO_MACHINE_S", 0.0)
     monkeypatch.setattr(pool, "_LOOKS_EVERY_S", 0.0)
     scripted = ScriptedParts(cores=(2, 2))
-    results = pool.Machines(scripted, 2, part_s=10.0).watch(plans(5))
+    results = pool.Machines(Connection(scripted), 2, part_s=10.0).watch(plans(5))
     assert next(results).status == "complete"
     scripted.cores = ()
     assert sorted((one.film.stem, one.status) for one in results) == [(str(k), "failed") for k in (1, 2, 3, 4)]

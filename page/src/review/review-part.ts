@@ -14,9 +14,10 @@ export class ReviewPart extends Part<RunView> {
 
   /** Whom a hazard is about, in words. */
   protected who(hazard: HazardAnswer): string {
-    const parties = hazard.parties.map((one) => `${this.say(one.kind as Word)} ${one.track_id}`).join(" · ");
+    const parties = hazard.parties.map((one) => `${this.say(one.kind as Word)} ${one.track_id}`);
+    if (hazard.rule === "proximity" && parties.length === 1) parties.push(this.say("perhapsSomebody"));
     const zone = hazard.zone ? this.say("inZone", { name: hazard.zone }) : "";
-    return [parties, zone].filter(Boolean).join(", ") || this.say("wholeStream");
+    return [parties.join(" · "), zone].filter(Boolean).join(", ") || this.say("wholeStream");
   }
 }
 

@@ -66,11 +66,12 @@ export class OpenHazards extends StatusPart {
     </li>`;
   }
 
-  private who({ track_ids, stream }: OpenHazard): string {
+  private who({ track_ids, stream, rule }: OpenHazard): string {
     const names = track_ids.map((id) => {
       const seen = stream.tracks.find((one) => one.id === id);
       return seen ? `${this.say(seen.kind as Word)} ${id}` : this.say("track", { n: id });
     });
+    if (rule === "proximity" && names.length === 1) names.push(this.say("perhapsSomebody"));
     return names.join(" · ") || this.say("wholeStream");
   }
 

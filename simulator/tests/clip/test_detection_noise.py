@@ -118,6 +118,19 @@ def test_an_error_goes_on_for_a_while_however_often_one_looks(gap_s: float) -> N
     assert np.corrcoef(left_px[1:], left_px[:-1])[0, 1] == pytest.approx(expected, abs=0.06)
 
 
+@pytest.mark.parametrize("gap_s", [0.1, 2.0])
+def test_a_miss_goes_on_for_as_long_as_is_said_of_misses(gap_s: float) -> None:
+    noise = _NONE_FALSE | {"worker": replace(_NONE_FALSE["worker"], found=(0.0, 0.0, 0.0))}
+    detector = NoisyDetector(_SIZE_PX, np.random.default_rng(6), noise, memory_s=0.1, miss_memory_s=2.0)
+    found = np.array([len(detector.detect(k, k * gap_s, [_worker()])) for k in range(_COUNT)])
+    # Of two numbers with this correlation so many are on the same side of zero (Sheppard, 1899).
+    alike = 0.5 + np.arcsin(np.exp(-gap_s / 2.0)) / np.pi
+    # However many looks there are, they hold no more news than as many memories as they last.
+    few = max(_COUNT * gap_s / 2.0, 1.0)
+    assert (found[1:] == found[:-1]).mean() == pytest.approx(alike, abs=4 * 0.5 / few**0.5)
+    assert found.mean() == pytest.approx(0.5, abs=4 * 0.5 / few**0.5)
+
+
 def test_the_same_generator_finds_the_same() -> None:
     assert _found(NOISE, _worker(), 4) == _found(NOISE, _worker(), 4)
     assert _found(NOISE, _worker(), 4) != _found(NOISE, _worker(), 5)

@@ -106,6 +106,16 @@ def test_some_lumps_of_many_are_the_same_lumps() -> None:
 
 
 @pytest.mark.live
+def test_of_whom_one_pixel_shows_the_box_has_a_left_and_a_right() -> None:
+    # One row of a worker's feet shows here, and ends above the middle of the pixel in which it is drawn.
+    site = build_site(plan_clip("ordinary", seed=3002, frames=15, fps=5.0, width_px=1280, height_px=720))
+    seen = [row for row in SiteTruth(site).at(4, 0.8).entities if row["visible_px"]]
+    boxes_px = np.array([[row[side] for side in _SIDES] for row in seen])
+    assert min(row["visible_px"] for row in seen) == 1
+    assert (boxes_px[:, :2] < boxes_px[:, 2:]).all()
+
+
+@pytest.mark.live
 @pytest.mark.usefixtures("opengl")
 def test_a_true_frame_says_what_the_rendered_one_shows() -> None:
     site = build_site(plan_clip("virtual", seed=5, width_px=1280, height_px=720))

@@ -10,19 +10,18 @@ from standoff.cli.console import print_table
 
 if TYPE_CHECKING:
     from standoff.evaluation.paper import ClipResult
-    from standoff.evaluation.paper.answers import Answers
+    from standoff.evaluation.paper.answers import Answers, FrameByFrame
     from standoff.evaluation.paper.warning_time import Breach
 
 
-def print_answers(results: Sequence[ClipResult]) -> None:
-    """Print the answers of each clip, and of all together where there are several."""
+def print_answers(clips: Sequence[tuple[str, FrameByFrame]]) -> None:
+    """Print the answers of each clip, or kind of clips, under its name, and of all together where there are several."""
     from standoff.evaluation.paper.answers import UP_TO_M, FrameByFrame
 
-    clips = [(result.clip.name, result.answers) for result in results if result.answers is not None]
     if not clips:
         return
     if len(clips) > 1:
-        clips.append((f"all {len(clips)}", FrameByFrame.together([answers for _, answers in clips])))
+        clips = [*clips, (f"all {len(clips)}", FrameByFrame.together([answers for _, answers in clips]))]
     rows = []
     for name, answers in clips:
         rows.append((name, "measured", *_figures(answers.measured)))

@@ -21,7 +21,7 @@ def print_results(results: Sequence[ClipResult]) -> None:
         _print_figures(result)
     _print_rectification(results)
     _print_distances(results)
-    print_answers(results)
+    print_answers([(result.clip.name, result.answers) for result in results if result.answers is not None])
     print_warning_times(results)
     _print_benchmark(results)
     _print_map_only(results)

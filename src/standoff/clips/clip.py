@@ -154,18 +154,19 @@ class Clip:
         ]
 
 
-def load_clip(folder: Path | str) -> Clip:
+def load_clip(folder: Path | str, *, with_film: bool = True) -> Clip:
     """Read a clip folder.
 
     Args:
         folder: Holds `video.mp4`, `scene.json`, `camera.yaml`, `reference.yaml` and the three tables of truth.
+        with_film: Whether there must be a video; `--truth-only` writes none.
 
     Raises:
         DataError: A file is missing or not what it should be, or the clip shows nothing that the paper's tests need.
     """
     folder = Path(folder)
     scene = read_scene(folder)
-    for name in (VIDEO_FILE, CAMERA_FILE, REFERENCE_FILE):
+    for name in (*([VIDEO_FILE] if with_film else []), CAMERA_FILE, REFERENCE_FILE):
         if not (folder / name).is_file():
             raise DataError(expected=f"{name} in the clip", found=f"no {folder / name}", fix=RENDER_AGAIN)
     truth, pairs, frames = (

@@ -33,7 +33,7 @@ from standoff.stages.ground import (
 from standoff.stages.hazard import HazardMonitor
 from standoff.stages.locate import Locator
 from standoff.stages.motion import MotionEstimator
-from standoff.stages.proximity import ProximityMeter
+from standoff.stages.proximity import ProximityMeter, machines_near_people
 from standoff.stages.track import Tracker
 from standoff.stages.watched import GroundWatcher
 
@@ -240,7 +240,12 @@ _MAKERS: Mapping[StageName, Callable[[Settings], Any]] = {
     "track": lambda settings: Tracker(settings.track),
     "locate": lambda settings: Locator(settings.locate),
     "proximity": lambda settings: ProximityMeter(settings.proximity),
-    "hazard": lambda settings: HazardMonitor(settings.hazard, build_zones(settings)),
+    "hazard": lambda settings: HazardMonitor(
+        settings.hazard,
+        build_zones(settings),
+        machines_near_people(settings.proximity.pairs),
+        settings.proximity.parked_after_s,
+    ),
 }
 
 

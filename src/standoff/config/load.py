@@ -238,7 +238,8 @@ def named_files(settings: Settings) -> dict[str, Path]:
         found["detections"] = settings.detections / DETECTIONS_FILE if is_run else settings.detections
     elif "detect" not in settings.replace:
         found["model"] = find_model(settings.model)
-        found["detect.ground_points"] = find_ground_points(settings.detect.ground_points)
+        for file in find_ground_points(settings.detect.ground_points):
+            found[f"detect.ground_points/{file.name}"] = file
     return {name: Path(path) for name, path in found.items() if path is not None}
 
 

@@ -56,6 +56,9 @@ CLASSES: tuple[SiteClass, ...] = (
     SiteClass(6, "reference", Role.REFERENCE, 0.0, 0.0, 0.0, 0.0),
 )
 
+CAB_WITHIN_M: Final = 2.5
+"""Who is so near to the middle of a machine is on it, not beside it."""
+
 _BETWEEN: Final = re.compile(r"[,;|\t]")
 _NUMBERED: Final = re.compile(r"(\d{1,6})(?:\s|\s*[:.,;)=-])\s*([^\W\d].*)")
 _DRESSED: Final[Mapping[str, re.Pattern[str]]] = {

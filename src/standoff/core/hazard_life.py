@@ -94,7 +94,8 @@ class HazardLife:
     @property
     def who(self) -> str:
         """Whom it is about, for people."""
-        who = " and ".join(self.names) or "whole picture"
+        alone = self.rule == "proximity" and len(self.names) == 1
+        who = " and ".join([*self.names, "perhaps somebody"] if alone else self.names) or "whole picture"
         if self.zone:
             return f"{who}: zone {self.zone}"
         return who if self.rule == "proximity" else f"{who} ({self.rule})"

@@ -26,8 +26,8 @@ class Hazard:
             measured.
         severity: Of the hazard at this event; "unknown" when it was never measured.
         phase: "opened" first, "closed" last; "unknown" while it cannot be measured.
-        track_ids: The pair, smaller id first; of a zone that nobody may be in the one track, of a crossing both; empty
-            where it is of the whole stream.
+        track_ids: The pair, smaller id first; the machine where somebody may stand near it whom no track shows; of a
+            zone that nobody may be in the one track, of a crossing both; empty where it is of the whole stream.
         time_s: Presentation timestamp.
         distance_m: Centre to centre, or to the zone, 0 in it; of two in a crossing, of the one further out; NaN while
             unknown.
@@ -78,6 +78,10 @@ class OpenHazards:
         """Return the open hazard of each pair of tracks that are too near to each other."""
         pairs = (event for event in self.latest if len(event.track_ids) == 2 and not event.zone)
         return {(event.track_ids[0], event.track_ids[1]): event for event in pairs}
+
+    def of_machines(self) -> tuple[Hazard, ...]:
+        """Return the open hazards of machines near which somebody may stand whom no track shows."""
+        return tuple(event for event in self.latest if len(event.track_ids) == 1 and not event.zone)
 
     def in_zones(self) -> tuple[Hazard, ...]:
         """Return the open hazards of zones."""

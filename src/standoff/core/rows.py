@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -41,7 +40,15 @@ class Rows:
         return len(getattr(self, next(iter(self._COLUMNS))))
 
     def __getitem__(self, mask: npt.NDArray[np.bool_] | npt.NDArray[np.int64] | slice) -> Self:
-        return replace(self, **{name: getattr(self, name)[mask] for name in self._COLUMNS})  # type: ignore[type-var]
+        # Rows of what was checked need no second check, which would take longer than all else here.
+        part = object.__new__(type(self))
+        for name, (_, tail) in self._COLUMNS.items():
+            column = getattr(self, name)[mask]
+            if np.ndim(column) != 1 + len(tail):
+                raise ValueError(f"{type(self).__name__} takes a mask, several rows or a slice, not {mask!r}")
+            column.setflags(write=False)
+            object.__setattr__(part, name, column)
+        return part
 
     def columns(self) -> dict[str, npt.NDArray[Any]]:
         """Return all columns by name."""

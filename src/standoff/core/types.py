@@ -14,7 +14,9 @@ from typing import ClassVar, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.clock import ToldBy as ToldBy
+from standoff.core.durations import have_lasted
 from standoff.core.ground_map import GroundMap as GroundMap
 from standoff.core.ground_map import NoGroundMap as NoGroundMap
 from standoff.core.hazards import Hazard as Hazard
@@ -26,6 +28,7 @@ from standoff.core.motions import CameraMotion as CameraMotion
 from standoff.core.motions import NoCameraMotion as NoCameraMotion
 from standoff.core.outcome import Outcome as Outcome
 from standoff.core.outcome import Silence as Silence
+from standoff.core.roles import IS_EQUIPMENT
 from standoff.core.rows import Columns, Rows
 from standoff.core.telemetry import Telemetry
 from standoff.core.watched_ground import WatchedGround as WatchedGround
@@ -33,6 +36,10 @@ from standoff.core.watched_ground import WatchedGround as WatchedGround
 IntArray = npt.NDArray[np.int64]
 ImageArray = npt.NDArray[np.uint8]
 TextArray = npt.NDArray[np.object_]
+
+PARKED = "the machine is parked"
+"""Why there is no hazard near a machine that has not moved for long."""
+_EXCAVATOR = CLASS_BY_NAME["excavator"].id
 
 
 class Luma(Protocol):
@@ -263,6 +270,19 @@ class GroundPositions(Rows):
         """(M, 2, 2) of xy_m, the map's share included; NaN where invalid."""
         shared: FloatArray = self.map_factor_m @ self.map_factor_m.transpose(0, 2, 1)
         return self.state_covariance[:, :2, :2] + shared
+
+    def parked(self, after_s: float | None) -> BoolArray:
+        """Tell (M,) which machines have not moved for so many seconds.
+
+        Never an excavator, which stands while it swings.
+
+        Args:
+            after_s: None: no machine is ever parked.
+        """
+        if after_s is None:
+            return np.zeros(len(self), dtype=np.bool_)
+        drives = IS_EQUIPMENT[self.class_id] & (self.class_id != _EXCAVATOR)
+        return np.asarray(have_lasted(self.standing_s, after_s) & drives)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

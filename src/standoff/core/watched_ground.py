@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -46,14 +47,17 @@ class WatchedGround:
             watched.
         around: (M,) of the ground about each track within the radii in which a worker counts as in danger, what share
             is watched; NaN of what is no machine, and where it has no place.
+        suspects: (M,) whether somebody whom no track shows may stand within those radii of it, on no machine.
     """
 
     cells: CellArray = field(default_factory=lambda: np.zeros((0, 0), dtype=np.int8))
     found_share: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
     around: FloatArray = field(default_factory=lambda: np.zeros(0))
+    suspects: BoolArray = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
 
     def __post_init__(self) -> None:
-        for name, kind in (("cells", np.int8), ("found_share", np.float64), ("around", np.float64)):
+        kinds = {"cells": np.int8, "found_share": np.float64, "around": np.float64, "suspects": np.bool_}
+        for name, kind in kinds.items():
             array: npt.NDArray[np.generic] = np.array(getattr(self, name), dtype=kind)
             array.setflags(write=False)
             object.__setattr__(self, name, array)
@@ -128,8 +132,11 @@ def cell_of(points_px: FloatArray, size_px: tuple[int, int]) -> tuple[npt.NDArra
     return places.astype(np.int64), inside
 
 
+@lru_cache(maxsize=16)
 def cell_middles_px(size_px: tuple[int, int]) -> FloatArray:
-    """Return (ROWS * COLUMNS, 2) the middles of the cells of a picture, row by row."""
+    """Return (ROWS * COLUMNS, 2) the middles of the cells of a picture, row by row; read-only."""
     width_px, height_px = size_px
     y, x = np.mgrid[:ROWS, :COLUMNS] + 0.5
-    return np.column_stack([x.ravel() * width_px / COLUMNS, y.ravel() * height_px / ROWS]) - 0.5
+    middles_px = np.column_stack([x.ravel() * width_px / COLUMNS, y.ravel() * height_px / ROWS]) - 0.5
+    middles_px.setflags(write=False)
+    return middles_px

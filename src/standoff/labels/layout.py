@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from standoff.core.errors import DataError
+from standoff.files.below import files_below
 from standoff.labels.coco import read_coco
 from standoff.labels.pictures import canvas_of, find_pictures
 from standoff.labels.source import SourcePicture, SourceSet, read_each, split_named
@@ -41,11 +42,11 @@ def read_set(path: Path, names: Sequence[str] | None = None, pictures: Path | No
         )
     if annotations := _coco_files(path / "annotations") or _coco_of_splits(path):
         return read_coco(annotations, pictures)
-    if next((path / "Annotations").rglob("*.xml"), None) is not None:
+    if next(files_below(path / "Annotations", {".xml"}), None) is not None:
         return read_voc(path)
     if (path / "data.yaml").is_file():
         return read_yolo_yaml(path / "data.yaml", names)
-    if next(path.rglob("*.txt"), None) is not None:
+    if next(files_below(path, {".txt"}), None) is not None:
         return read_yolo_folder(path, names)
     raise DataError(
         expected=f"a data set in {path}",

@@ -13,6 +13,7 @@ from PIL import Image, UnidentifiedImageError
 
 from standoff.core.errors import DataError
 from standoff.core.types import ImageArray
+from standoff.files.below import files_below
 from standoff.files.lfs import POINTER, is_pointer, refuse_pointer
 from standoff.files.orientation import UPRIGHT, Orientation
 from standoff.files.picture_header import PictureHeader, UnreadablePicture, read_header
@@ -34,8 +35,7 @@ _READ_AS: Final = {
 
 def find_pictures(folder: Path) -> list[Path]:
     """Return all pictures in a folder and below it, sorted; hidden ones are left out."""
-    found = (path for path in folder.rglob("*") if path.suffix.lower() in SUFFIXES)
-    return sorted(path for path in found if not any(part.startswith(".") for part in path.relative_to(folder).parts))
+    return list(files_below(folder, SUFFIXES))
 
 
 @dataclass(frozen=True, slots=True)

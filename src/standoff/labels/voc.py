@@ -16,6 +16,7 @@ from typing import Final
 
 import numpy as np
 
+from standoff.files.below import files_below
 from standoff.files.plain_text import read_text
 from standoff.labels.layout_doubts import CORNERS, check_layout
 from standoff.labels.pictures import SUFFIXES, canvas_of
@@ -36,7 +37,7 @@ _PICTURE_FOLDERS: Final = ("JPEGImages", "images", ".")
 def read_voc(folder: Path) -> SourceSet:
     """Read a folder with `Annotations`; `ImageSets/Main/{train,val,test}.txt` say the splits where they are."""
     splits = _read_splits(folder / "ImageSets" / "Main")
-    files = sorted((folder / "Annotations").rglob("*.xml"))
+    files = list(files_below(folder / "Annotations", {".xml"}))
     read, problems = read_each(files, partial(_read_picture, folder, splits))
     pictures, notes = _from_first_pixel(read, folder)
     check_layout(pictures, folder, CORNERS)

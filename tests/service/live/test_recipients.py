@@ -144,6 +144,16 @@ def test_near_is_near_one_of_the_hazards_tracks_by_what_his_position_allows() ->
         assert told(made) == ({"wrist": "near"} if reached else {})
 
 
+def test_whoever_may_be_the_one_suspected_within_a_machines_reach_is_told() -> None:
+    for apart_m, reached in ((14.0, True), (16.0, False)):
+        place = at((EXCAVATOR_M[0], EXCAVATOR_M[1] + apart_m))
+        made = recipients({"wrist": WORKER}, sighting(), wrist=place)
+        machine = next(one for one in sighting().tracks if one.kind == "excavator")
+        alone = hazard(track_ids=(machine.track_id,), classes=("excavator",), severity="unknown")
+        assert told(made, alone) == ({"wrist": "near"} if reached else {})
+        assert told(made) == {}
+
+
 def test_who_has_a_track_of_his_own_is_not_told_of_those_near_him() -> None:
     own = replace(sighting(), tracks=(*sighting().tracks, track(3, "worker", (20.0, 16.0))))
     made = recipients({"wrist": WORKER}, own, wrist=at((20.0, 16.0)))

@@ -12,7 +12,7 @@ from square_detector import draw_squares, write_detector
 
 from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.errors import ModelError
-from standoff.stages.detect import DetectParams, OnnxDetector, find_model
+from standoff.stages.detect import DetectParams, OnnxDetector, find_ground_points, find_model
 from standoff.stages.detect.point_crops import POINT_CLASSES, POINT_CROP_AROUND
 from standoff.stages.detect.point_network import TELLS_KEY, PointNetwork
 from standoff.stages.frames import frame_from_array
@@ -100,6 +100,22 @@ def test_a_file_is_asked_of_the_classes_that_it_names(points_file: Path, tmp_pat
     assert np.isnan(points_px).all(axis=1).tolist() == [True, False]
 
 
+def test_each_class_is_told_by_one_of_the_networks_that_come_with_standoff() -> None:
+    image = np.random.default_rng(0).integers(0, 256, (200, 300, 3)).astype(np.uint8)
+    class_id = np.array([CLASS_BY_NAME[name].id for name in POINT_CLASSES])
+    boxes_px = np.tile([20.0, 30.0, 60.0, 110.0], (len(class_id), 1))
+    told = [PointNetwork(file, "cpu", 1).points(image, boxes_px, class_id)[0] for file in find_ground_points("site")]
+    np.testing.assert_array_equal(np.isfinite(told).all(axis=2).sum(axis=0), 1)
+
+
+def test_a_detector_takes_the_points_of_all_networks(tmp_path: Path) -> None:
+    image, _ = draw_squares(np.random.default_rng(0), 12)
+    found = OnnxDetector(write_detector(tmp_path), DetectParams()).detect(frame_from_array(image))
+    known = np.isin(found.class_id, [CLASS_BY_NAME[name].id for name in POINT_CLASSES])
+    np.testing.assert_array_equal(np.isfinite(found.foot_px).all(axis=1), known)
+    assert len(set(found.class_id[known].tolist()) - {CLASS_BY_NAME["worker"].id, CLASS_BY_NAME["excavator"].id}) > 0
+
+
 def test_another_network_in_its_place_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ModelError, match="a network of ground points"):
         PointNetwork(write_detector(tmp_path), "cpu", 1)
@@ -109,5 +125,5 @@ def test_another_network_in_its_place_is_refused(tmp_path: Path) -> None:
 
 def test_the_detectors_description_names_the_network(points_file: Path, tmp_path: Path) -> None:
     model = write_detector(tmp_path)
-    for name, expected in ((str(points_file), points_file.name), ("none", None)):
+    for name, expected in ((str(points_file), [points_file.name]), ("none", [])):
         assert OnnxDetector(model, DetectParams(ground_points=name)).describe()["ground_points"] == expected

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -66,6 +67,17 @@ def events_of(
         ground = gaps if isinstance(gaps, NoGroundMap) else GROUND
         rows = frame({(1, 2): NAN} if isinstance(gaps, NoGroundMap) else gaps)
         events += monitor.update(step_s * index, *rows, ground, FOLLOWED)
+    return events
+
+
+def events_of_likely(breaches: Iterable[float], params: HazardParams) -> list[Hazard]:
+    """Run a monitor over frames of one pair that is in breach so likely, now and ahead; NaN is not measured."""
+    monitor = HazardMonitor(params)
+    events: list[Hazard] = []
+    for index, likely in enumerate(breaches):
+        positions, pairs = frame({(1, 2): likely * 0.0})
+        known = replace(pairs, breach_now=np.array([likely]), breach_ahead=np.array([likely]))
+        events += monitor.update(STEP_S * index, positions, known, GROUND, FOLLOWED)
     return events
 
 

@@ -26,7 +26,9 @@ def test_probabilities_decide_whatever_the_gap(now: float, ahead: float, gap_m: 
     levels = levels_of(reading(gap_m, now, ahead), PROBABLE)
     assert levels is not None
     assert levels.near == Limit(ahead >= 0.4, ahead < 0.2)
-    assert levels.breached == Limit(now >= 0.6, now < 0.3)
+    assert levels.breached == Limit(now >= 0.6, now < 0.3, now >= 0.95)
+    cautious = levels_of(reading(gap_m, now, ahead), HazardParams(danger_probability=0.97))
+    assert cautious is not None and cautious.breached.sure == (now >= 0.97)
 
 
 @given(gap_m=st.floats(-7, 50), now=st.floats(0, 1), ahead=st.floats(0, 1))

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,12 +15,13 @@ from stages.hazard.frames_of_gaps import (
     STEP_S,
     Gaps,
     events_of,
+    events_of_likely,
     frame,
     pair_events,
     told,
 )
 
-from standoff.core.types import GroundPositions, NoGroundMap, Proximities
+from standoff.core.types import GroundPositions, Hazard, NoGroundMap, Proximities
 from standoff.stages.hazard import HazardMonitor, HazardParams
 
 
@@ -46,6 +48,34 @@ def test_a_single_bad_frame_is_no_alarm_unless_asked_for() -> None:
     blip = [10.0, -5.0, 10.0, 10.0]
     assert pair_events(blip) == []
     assert pair_events(blip, HazardParams(min_duration_s=0.0))[0].severity == "danger"
+
+
+@pytest.mark.parametrize(
+    ("breaches", "opened_s"),
+    [
+        ([0.96, 0.96, 0.96], 0.0),  # who is first seen in the middle of a circle
+        ([NAN, NAN, 0.96, 0.96], 0.25),
+        ([0.94, 0.94, 0.94, 0.94], 0.25),  # perhaps a worker beside it
+        ([0.01, 0.96, 0.96, 0.96], 0.375),  # has been clear: that he is inside may be one bad frame
+        ([0.01, NAN, 0.96, 0.96, 0.96], 0.5),
+    ],
+)
+def test_who_is_in_danger_beyond_doubt_when_first_measured_is_warned_of_at_once(
+    breaches: list[float], opened_s: float
+) -> None:
+    events = events_of_likely(breaches, replace(CALM, rule="probability"))
+    assert told(events) == [("opened", "danger", opened_s)]
+
+
+def test_a_pair_that_comes_back_is_not_measured_for_the_first_time() -> None:
+    monitor = HazardMonitor()
+    events: list[Hazard] = []
+    for index in range(20):
+        likely = 0.01 if index < 8 else 0.97
+        positions, pairs = frame({} if 8 <= index < 12 else {(1, 2): 0.0})
+        known = replace(pairs, breach_now=np.full(len(pairs), likely), breach_ahead=np.full(len(pairs), likely))
+        events += monitor.update(STEP_S * index, positions, known, GROUND, FOLLOWED)
+    assert told(events)[0] == ("opened", "danger", 1.75)
 
 
 def test_a_setting_that_would_switch_the_alarm_off_is_refused() -> None:

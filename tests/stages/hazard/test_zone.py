@@ -95,6 +95,23 @@ def test_somebody_in_a_zone_is_danger_once_it_has_lasted_and_over_once_he_has_le
     assert events[-1].reason == "clear for 0.5 s"
 
 
+@pytest.mark.parametrize(
+    ("sigma_m", "frames", "opened_s"),
+    [
+        (0.1, [{1: IN}] * 4, 0.0),
+        (0.1, [{1: UNSEEN}] * 2 + [{1: IN}] * 4, 0.25),
+        (6.0, [{1: IN}] * 4, 0.25),  # perhaps beside it
+        (0.1, [{1: AWAY}] + [{1: IN}] * 4, 0.375),  # was elsewhere: that he is inside may be one bad frame
+        (0.1, [{1: AWAY}, {}, {}] + [{1: IN}] * 4, 0.625),
+    ],
+)
+def test_who_is_in_a_zone_beyond_doubt_when_first_located_is_warned_of_at_once(
+    sigma_m: float, frames: list[Frame], opened_s: float
+) -> None:
+    events = events_of(frames, sigma_m=sigma_m)
+    assert (events[0].phase, events[0].time_s) == ("opened", opened_s)
+
+
 def test_near_a_zone_it_is_a_warning_that_becomes_danger_and_back() -> None:
     events = events_of(worker(*[NEAR] * 4, *[IN] * 4, *[(5.0, -0.9)] * 8, *[(5.0, -1.4)] * 8, *[AWAY] * 5))
     assert told(events) == [
@@ -163,7 +180,7 @@ def test_a_worker_and_a_machine_in_a_crossing_are_one_hazard_as_grave_as_the_one
 
 def test_who_is_in_a_zone_and_cannot_be_located_any_more_is_unknown_until_he_can() -> None:
     events = events_of(worker(*[IN] * 4, *[UNSEEN] * 20, *[IN] * 4))
-    assert told(events) == [("opened", "danger", 0.25), ("unknown", "danger", 0.75), ("updated", "danger", 3.0)]
+    assert told(events) == [("opened", "danger", 0.0), ("unknown", "danger", 0.75), ("updated", "danger", 3.0)]
     assert len({event.hazard_id for event in events}) == 1
     assert events[1].reason == CUT_OFF
     assert math.isnan(events[1].distance_m) and math.isnan(events[1].gap_m)
@@ -188,7 +205,7 @@ def test_somebody_who_was_never_located_may_be_anywhere_but_not_at_once() -> Non
 def test_an_unknown_hazard_ends_once_he_is_located_elsewhere_and_takes_its_level_once_he_is_located_inside() -> None:
     assert told(events_of(worker(*[UNSEEN] * 10, *[AWAY] * 8)))[-1] == ("closed", "unknown", 1.75)
     inside = events_of(worker(*[UNSEEN] * 10, *[IN] * 8))
-    assert [event.severity for event in inside] == ["unknown", "warning", "danger"]
+    assert [event.severity for event in inside] == ["unknown", "danger"]
 
 
 def test_in_a_crossing_one_who_cannot_be_located_leaves_the_pair_unknown_only_while_the_other_is_there() -> None:

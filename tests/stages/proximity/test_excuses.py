@@ -10,7 +10,8 @@ from stages.locate.test_ground_filter import wobbling
 from stages.proximity.test_meter import positions_of
 
 from standoff.core.classes import CLASS_BY_NAME
-from standoff.stages.proximity.excuses import IN_CAB, PARKED, TOGETHER, Excuses
+from standoff.core.types import PARKED
+from standoff.stages.proximity.excuses import IN_CAB, TOGETHER, Excuses
 from standoff.stages.proximity.params import ProximityParams
 
 WORKER, LOADER, EXCAVATOR = (CLASS_BY_NAME[name].id for name in ("worker", "wheel_loader", "excavator"))

@@ -17,7 +17,7 @@ from stages.sinks.fake_site import FakeSite, ended, quiet
 from standoff.core import homography
 from standoff.core.camera import Camera
 from standoff.core.homography import BoolArray
-from standoff.core.types import FrameResult, ImageArray, OpenHazards, Outcome, WatchedGround
+from standoff.core.types import FrameResult, ImageArray, OpenHazards, Outcome, Proximities, WatchedGround
 from standoff.core.watched_ground import (
     BEHIND_MACHINE,
     BLURRED,
@@ -219,6 +219,24 @@ def test_a_machine_with_ground_about_it_that_is_not_watched_says_so() -> None:
         5: "0 % around it watched",
     }
     assert sketch(result, WatchedGround()).measurements.around_words() == {}
+
+
+def test_a_machine_near_which_somebody_may_stand_says_so_in_the_colour_of_what_is_unknown() -> None:
+    site, monitor = FakeSite(SIZE), HazardMonitor()
+    suspects = np.array([True, False, True, False, False])
+    watched = replace(of_cells(all_cells(WATCHED)), suspects=suspects)
+    open_hazards = OpenHazards()
+    for k in range(12):
+        result = replace(site.result(0), proximities=Proximities.empty())
+        events = monitor.update(
+            0.1 * k, result.positions, result.proximities, result.ground, result.unfollowed, watched
+        )
+        open_hazards = open_hazards.after(events)
+    measurements = sketch(replace(result, open_hazards=open_hazards), watched).measurements
+    assert measurements.machine_words() == {3: "somebody may stand near it"}
+    assert measurements.track_tones()[2] == "unknown"
+    assert sketch(result, watched).measurements.machine_words() == {}
+    assert sketch(result, watched).measurements.track_tones()[2] != "unknown"
 
 
 def test_a_stream_of_which_no_ground_is_watched_says_so_as_plainly_as_one_without_map() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,7 @@ from stages.watched.drawn_site import SIZE_PX, ground_map, site_picture
 from stages.watched.test_watcher import FINDING, NOTHING, SEEDS, frame, machine, nobody
 
 from standoff.core.homography import FloatArray
-from standoff.core.types import Detections, GroundMap, GroundPositions, NoGroundMap, Tracks
+from standoff.core.types import Detections, GroundMap, GroundPositions, Hazard, NoGroundMap, Proximities, Tracks
 from standoff.core.watched_ground import (
     MAYBE_SOMEBODY,
     REASONS,
@@ -20,6 +21,7 @@ from standoff.core.watched_ground import (
     cell_middles_px,
     cell_of,
 )
+from standoff.stages.hazard import HazardMonitor
 from standoff.stages.watched import GroundWatcher, WatchedParams
 from standoff.stages.watched.suspects import Suspects
 
@@ -155,3 +157,72 @@ def test_without_a_map_nothing_is_watched_and_suspects_are_remembered() -> None:
     assert under(cells_of(one, NOTHING, 0.4)) == MAYBE_SOMEBODY
     one.reset()
     assert MAYBE_SOMEBODY not in cells_of(one, NOTHING, 0.6)
+
+
+def suspects_of(
+    looks: Sequence[Detections], away_m: float, class_id: int = EXCAVATOR, *, step_s: float = 0.5
+) -> list[bool]:
+    """Return in which looks somebody at `FOOT_PX` is suspected near a machine so far from him."""
+    ground, one = ground_map(), watcher()
+    (foot_m,), _ = ground.to_ground(FOOT_PX[None])
+    tracks, positions = machine((10.0, 10.0, 60.0, 60.0), (0.0, 0.0), 12.1)
+    beside = replace(positions, xy_m=foot_m[None] + (away_m, 0.0), class_id=np.array([class_id]))
+    return [
+        bool(one.update(frame(site_picture(0), k * step_s), look, ground, tracks, beside).suspects[0])
+        for k, look in enumerate(looks)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("away_m", "class_id", "expected"),
+    [
+        (13.9, EXCAVATOR, True),
+        (14.3, EXCAVATOR, False),
+        (2.6, EXCAVATOR, True),
+        (2.4, EXCAVATOR, False),
+        (3.0, WORKER, False),
+    ],
+)
+def test_somebody_is_suspected_near_the_machines_that_could_reach_him_and_not_on_them(
+    away_m: float, class_id: int, expected: bool
+) -> None:
+    assert suspects_of([seen()], away_m, class_id) == [expected]
+
+
+def test_whoever_is_on_one_machine_is_not_near_another() -> None:
+    ground = ground_map()
+    (foot_m,), _ = ground.to_ground(FOOT_PX[None])
+    tracks, positions = machine((10.0, 10.0, 60.0, 60.0), (0.0, 0.0), 12.1)
+    both = np.array([0, 0])
+    for away_m, expected in ((2.4, False), (2.6, True)):
+        two = replace(positions[both], track_id=np.array([1, 2]), xy_m=foot_m + np.array([[away_m, 0.0], [9.0, 0.0]]))
+        watched = watcher().update(frame(site_picture(0)), seen(), ground, tracks[both], two)
+        assert watched.suspects.tolist() == [expected] * 2
+
+
+def test_somebody_is_suspected_near_a_machine_for_two_seconds_after_he_was_seen() -> None:
+    yes, no = seen(), NOTHING
+    assert suspects_of([no, yes, no, no, no, no, no], 5.0) == [False, True, True, True, True, True, False]
+
+
+def test_where_the_machine_has_no_place_and_where_there_is_no_map_nobody_is_suspected() -> None:
+    tracks, positions = machine((10.0, 10.0, 60.0, 60.0), (0.0, 0.0), 12.1)
+    nowhere = replace(positions, xy_m=np.full((1, 2), np.nan), valid=np.zeros(1, dtype=np.bool_))
+    for ground in (ground_map(), NoGroundMap("none")):
+        watched = watcher().update(frame(site_picture(0)), seen(), ground, tracks, nowhere)
+        assert watched.suspects.tolist() == [False]
+
+
+def test_what_may_be_a_worker_near_a_machine_is_one_hazard_while_he_is_seen_and_a_while_after() -> None:
+    ground = ground_map()
+    (foot_m,), _ = ground.to_ground(FOOT_PX[None])
+    tracks, positions = machine((10.0, 10.0, 60.0, 60.0), (0.0, 0.0), 12.1)
+    beside = replace(positions, xy_m=foot_m[None] + (5.0, 0.0))
+    one, monitor = watcher(), HazardMonitor()
+    events: list[Hazard] = []
+    for k in range(12):
+        found = seen() if 2 <= k < 6 else NOTHING
+        watched = one.update(frame(site_picture(0), 0.5 * k), found, ground, tracks, beside)
+        events += monitor.update(0.5 * k, beside, Proximities.empty(), ground, np.zeros(0, dtype=np.bool_), watched)
+    told = [(event.phase, event.time_s) for event in events if event.rule == "proximity"]
+    assert told == [("opened", 2.0), ("closed", 5.5)]

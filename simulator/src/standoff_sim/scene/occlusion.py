@@ -243,7 +243,11 @@ class Outlines:
         exact_px = self._inside(outline.above_px)
         measured_px = (seen_px + np.maximum([left, top, left, top], 0)) * self._factor - 0.5
         ends = (np.abs(seen_px - inside_px) <= _EDGE_PX) & np.isfinite(exact_px)
-        return Sight(np.where(ends, exact_px, measured_px), outline.full_px, visible_px, min(1.0, count / whole_count))
+        edges_px = np.where(ends, exact_px, measured_px)
+        # Where hardly a pixel shows, an exact edge may lie beyond a measured one.
+        crossed = np.tile(edges_px[:2] >= edges_px[2:], 2)
+        box_px = np.where(crossed, measured_px, edges_px)
+        return Sight(box_px, outline.full_px, visible_px, min(1.0, count / whole_count))
 
     def _untouched(
         self, outline: _Outline, own_ids: npt.NDArray[np.uint16], width: int, height: int

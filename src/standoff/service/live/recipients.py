@@ -10,6 +10,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from standoff.config import ReceiverSettings
+from standoff.core.classes import CLASS_BY_NAME
 from standoff.core.geographic import GeographicOrigin
 from standoff.messages import DevicePosition, HazardNews, Supervision
 from standoff.messages.events import Because
@@ -262,10 +263,16 @@ class Recipients:
         sighting, place = self._sightings.get(hazard.stream), self._place(state, hazard.stream)
         if sighting is None or place is None or state.position is None or sighting.session != hazard.session:
             return False
-        reach_m = _NEAR_M + 3.0 * state.position.sigma_m
-        return any(
-            math.dist(track.xy_m, place) <= reach_m for track in sighting.tracks if track.track_id in hazard.track_ids
-        )
+        spread_m = 3.0 * state.position.sigma_m
+        tracks = [track for track in sighting.tracks if track.track_id in hazard.track_ids]
+        return any(math.dist(track.xy_m, place) <= _reach_m(track, hazard) + spread_m for track in tracks)
+
+
+def _reach_m(track: SeenTrack, hazard: HazardNews) -> float:
+    """Return how far from a track of a hazard its other side may be; of a machine alone, as far as it reaches."""
+    if hazard.zone or len(hazard.track_ids) > 1:
+        return _NEAR_M
+    return max(_NEAR_M, CLASS_BY_NAME[track.kind].action_radius_m + CLASS_BY_NAME["worker"].action_radius_m)
 
 
 def _apart(track: SeenTrack, place: tuple[float, float], spread_m: float) -> float:

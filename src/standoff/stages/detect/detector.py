@@ -60,10 +60,9 @@ class OnnxDetector(protocols.Detector):
         finds_once = self._network.interface.finds_once
         self._iou_in_view = max(self._params.nms_iou, _SAME_BOX_IOU) if finds_once else self._params.nms_iou
         self._sha256 = file_sha256(path)
-        points_path = find_ground_points(self._params.ground_points)
+        self._points_files = find_ground_points(self._params.ground_points)
         threads = self._params.intra_op_threads
-        self._points = None if points_path is None else PointNetwork(points_path, self._params.provider, threads)
-        self._points_file = None if points_path is None else points_path.name
+        self._points = [PointNetwork(file, self._params.provider, threads) for file in self._points_files]
 
     def _columns_by_class(self) -> dict[int, IntArray]:
         """Site class id to the output columns of its labels, counted from the first class."""
@@ -95,7 +94,7 @@ class OnnxDetector(protocols.Detector):
             "classes": list(self._classes),
             "class_map": dict(self._site_class_of),
             "ignored_labels": [label for label in self._classes if label not in self._site_class_of],
-            "ground_points": self._points_file,
+            "ground_points": [file.name for file in self._points_files],
             "providers": self._network.providers,
             "onnxruntime": onnxruntime.__version__,
         }
@@ -147,16 +146,19 @@ class OnnxDetector(protocols.Detector):
         return found, view.is_cut(found.xyxy_px, margin_px)
 
     def _pointed(self, found: Detections, resized: ImageArray, letterbox: Letterbox) -> Detections:
-        """Let the network of ground points say where things stand of which the detector does not."""
+        """Let the networks of ground points say where things stand of which the detector does not."""
         untold = np.isnan(found.foot_px).any(axis=1)
-        if self._points is None or not untold.any():
+        if not self._points or not untold.any():
             return found
         scale = letterbox.source_px_per_input_px
         boxes_px = (found.xyxy_px[untold] + 0.5) / np.tile(scale, 2) - 0.5
-        points_px, sigma_px = self._points.points(resized, boxes_px, found.class_id[untold])
         foot_px, covariance_px2 = found.foot_px.copy(), found.foot_covariance_px2.copy()
-        foot_px[untold] = (points_px + 0.5) * scale - 0.5
-        covariance_px2[untold] = ((sigma_px * scale) ** 2)[:, :, None] * np.eye(2)
+        for network in self._points:
+            points_px, sigma_px = network.points(resized, boxes_px, found.class_id[untold])
+            told = np.isfinite(points_px).all(axis=1)
+            rows = np.flatnonzero(untold)[told]
+            foot_px[rows] = (points_px[told] + 0.5) * scale - 0.5
+            covariance_px2[rows] = ((sigma_px[told] * scale) ** 2)[:, :, None] * np.eye(2)
         return replace(found, foot_px=foot_px, foot_covariance_px2=covariance_px2)
 
     def _classified(self, candidates: Candidates, letterbox: Letterbox) -> Detections:

@@ -59,7 +59,7 @@ class DetectParams:
         str,
         Doc(
             "Small network that tells where the things in the boxes stand, if the detector does not: 'site', the "
-            "one that comes with standoff; 'none': then where things of a class usually stand; or an ONNX file."
+            "two that come with standoff; 'none': then where things of a class usually stand; or an ONNX file."
         ),
     ] = "site"
     provider: Annotated[Provider, Doc("What computes; 'auto' takes CUDA where ONNX Runtime has it, else the CPU.")] = (

@@ -12,24 +12,27 @@ ShippedModel = Literal["site"]
 SHIPPED_MODELS: Final[tuple[ShippedModel, ...]] = get_args(ShippedModel)
 
 
-_GROUND_POINTS: Final = "ground-points.onnx"
+_GROUND_POINTS: Final = ("ground-points.onnx", "ground-points-machines.onnx")
+"""Of workers and excavators, and of the other machines."""
 
 
-def find_ground_points(name: str) -> Path | None:
-    """Return the file of a network of ground points.
+def find_ground_points(name: str) -> tuple[Path, ...]:
+    """Return the files of the networks of ground points.
 
     Args:
         name: "site", "none", or the path of an ONNX file.
 
     Returns:
-        None for "none".
+        Of different classes each; nothing for "none".
 
     Raises:
-        ModelError: standoff was installed without it.
+        ModelError: standoff was installed without one.
     """
     if name == "none":
-        return None
-    return _file_of_ours(_GROUND_POINTS, "the network of ground points") if name == "site" else Path(name)
+        return ()
+    if name != "site":
+        return (Path(name),)
+    return tuple(_file_of_ours(file, "a network of ground points") for file in _GROUND_POINTS)
 
 
 def find_model(model: str | Path) -> Path:

@@ -61,14 +61,14 @@ class Latch:
         """Whether it is on, or on its way to turn on."""
         return self.on or self._since_s is not None
 
-    def update(self, time_s: float, *, enters: bool, leaves: bool, rare: bool = False) -> None:
+    def update(self, time_s: float, *, enters: bool, leaves: bool, at_once: bool = False) -> None:
         """Take what holds now; neither holds between the two limits of a hysteresis.
 
         Args:
             time_s: Presentation timestamp.
             enters: It should turn on.
             leaves: It should turn off.
-            rare: The last look was so long ago that a second one would come too late: it turns on at once.
+            at_once: It turns on without waiting whether the condition holds.
         """
         if not (leaves if self.on else enters):
             self._since_s = None
@@ -76,7 +76,7 @@ class Latch:
         if self._since_s is None:
             self._since_s = time_s
         needed_s = self._off_after_s if self.on else self._on_after_s
-        if (rare and not self.on) or has_lasted(self._since_s, time_s, needed_s):
+        if (at_once and not self.on) or has_lasted(self._since_s, time_s, needed_s):
             self.on, self._since_s = not self.on, None
 
     def finish(self) -> None:

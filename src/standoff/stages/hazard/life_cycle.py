@@ -18,10 +18,12 @@ class Limit:
     Attributes:
         passed: It is passed.
         clear: It is left far enough behind for the level to end.
+        sure: It is passed beyond doubt.
     """
 
     passed: bool
     clear: bool
+    sure: bool = False
 
 
 class HazardLifeCycle:
@@ -63,7 +65,7 @@ class HazardLifeCycle:
         return self._near.stirred or self._breached.stirred
 
     def measure(
-        self, time_s: float, reading: Reading, near: Limit, breached: Limit, *, rare: bool = False
+        self, time_s: float, reading: Reading, near: Limit, breached: Limit, *, at_once: bool = False
     ) -> Hazard | None:
         """Take a measurement and return what there is to say of it.
 
@@ -72,12 +74,12 @@ class HazardLifeCycle:
             reading: The measurement.
             near: What it says of a warning.
             breached: What it says of danger.
-            rare: The last look was so long ago that what holds is said at once.
+            at_once: What holds is said at once.
         """
         self._missing_since_s = self._lost_since_s = None
         self._reading = reading
         for latch, limit in ((self._near, near), (self._breached, breached)):
-            latch.update(time_s, enters=limit.passed, leaves=limit.clear, rare=rare)
+            latch.update(time_s, enters=limit.passed, leaves=limit.clear, at_once=at_once)
         self._was_clear |= not self._is_stirred
         if not self._near.on and not self._breached.on:
             return self.end(time_s, reading.excuse or f"clear for {self._params.release_s:g} s")
@@ -98,7 +100,7 @@ class HazardLifeCycle:
             reason: Why.
             may_open: False while something else already says that nothing can be measured.
         """
-        self._lost_since_s = None
+        was_lost, self._lost_since_s = self._lost_since_s is not None, None
         self._reading = UNMEASURED
         if self._missing_since_s is None:
             self._missing_since_s = time_s
@@ -108,7 +110,8 @@ class HazardLifeCycle:
         if not has_lasted(self._missing_since_s, time_s, patience_s):
             return None
         if self._hazard is not None:
-            return self._hazard.event("unknown", time_s, reason=reason) if self._hazard.measured else None
+            is_news = self._hazard.measured or was_lost
+            return self._hazard.event("unknown", time_s, reason=reason) if is_news else None
         if not may_open:
             return None
         self._near.hold_on()

@@ -9,6 +9,7 @@ from typing import Any
 from standoff.core import protocols
 from standoff.core.durations import is_apart
 from standoff.core.homography import BoolArray
+from standoff.core.roles import IS_EQUIPMENT
 from standoff.core.types import GroundMap, GroundPositions, Hazard, NoGroundMap, Proximities, WatchedGround
 from standoff.core.zones import Zone
 from standoff.stages.hazard.absence import AbsenceWatch
@@ -16,7 +17,9 @@ from standoff.stages.hazard.alarm_load import AlarmLoad
 from standoff.stages.hazard.latch import NOT_MEASURED, NOT_WATCHED, TRACK_LOST, LastPhase, Reading
 from standoff.stages.hazard.levels import levels_of
 from standoff.stages.hazard.life_cycle import HazardLifeCycle
+from standoff.stages.hazard.newcomers import Newcomers
 from standoff.stages.hazard.params import HazardParams
+from standoff.stages.hazard.suspected import SuspectedHazards
 from standoff.stages.hazard.unfollowed import UnfollowedHazard
 from standoff.stages.hazard.zone import ZoneRule
 
@@ -36,27 +39,38 @@ class HazardMonitor(protocols.HazardMonitor):
 
     A hazard's first event is "opened", its last "closed", and nothing follows that. An event carries the
     time at which it is said, `min_duration_s` after the condition began; at once where frames are further apart than
-    that, and at the end of the stream for what only its last frames showed. What cannot be measured is
-    never taken for safe: an open hazard becomes "unknown", a visible pair that stays unmeasured opens
-    one of severity "unknown", and a stream without a ground map has one hazard of rule "measurement"
-    in place of one for each pair; where many sure detections are in no track, or hardly any of the ground is watched,
-    there is another one. Zones have hazards of the same life (`ZoneRule`).
+    that, or where the first measurement of a pair is danger without doubt; and at the end of the stream for what only
+    its last frames showed. What cannot be measured is never taken for safe: an open hazard becomes "unknown", a visible
+    pair that stays unmeasured opens one of severity "unknown", and a stream without a ground map has one hazard of rule
+    "measurement" in place of one for each pair; where many sure detections are in no track, or hardly any of the ground
+    is watched, there is another one. So is there for a machine near which somebody may stand whom no track shows
+    (`SuspectedHazards`). Zones have hazards of the same life (`ZoneRule`).
 
     Args:
         params: Settings; the defaults when left out.
         zones: Parts of the site with a rule of their own.
+        machines: (C,) by class id, near which machines people are watched; all when left out.
+        parked_after_s: Near a machine that has stood for so long nobody is suspected; None: near every one.
     """
 
-    def __init__(self, params: HazardParams | None = None, zones: Sequence[Zone] = ()) -> None:
+    def __init__(
+        self,
+        params: HazardParams | None = None,
+        zones: Sequence[Zone] = (),
+        machines: BoolArray = IS_EQUIPMENT,
+        parked_after_s: float | None = None,
+    ) -> None:
         self._params = params or HazardParams()
         self._given_zones = tuple(zones)
         self._map = AbsenceWatch(self._params, MAP_IS_BACK)
         self._follow = UnfollowedHazard(self._params)
         self._sight = AbsenceWatch(self._params, WATCHED_AGAIN)
         self._pairs: dict[Pair, HazardLifeCycle] = {}
+        self._newcomers = Newcomers[Pair]()
         self._load = AlarmLoad()
         self._looked_s = math.inf
         self._zones = ZoneRule(self._given_zones, self._params)
+        self._suspected = SuspectedHazards(self._params, machines, parked_after_s)
 
     def describe(self) -> dict[str, Any]:
         """Return what there is to say of the stream so far, for the record."""
@@ -72,7 +86,7 @@ class HazardMonitor(protocols.HazardMonitor):
         unfollowed: BoolArray,
         watched: WatchedGround = _NOBODY_JUDGED,
     ) -> tuple[Hazard, ...]:
-        """Take one frame and return its events, the stream's own first, then by pair, then by zone.
+        """Take one frame and return its events, the stream's own first, then by pair, by machine and by zone.
 
         Args:
             time_s: Presentation timestamp.
@@ -91,6 +105,9 @@ class HazardMonitor(protocols.HazardMonitor):
         rare = is_apart(self._looked_s, time_s, self._params.min_duration_s)
         self._looked_s = time_s
         readings = _readings(proximities)
+        new = self._newcomers.among(
+            time_s, [pair for pair, reading in readings.items() if not math.isnan(reading.gap_m)]
+        )
         reasons = dict(zip(positions.track_id.tolist(), positions.reason.tolist(), strict=True))
         for pair in sorted(self._pairs.keys() | readings.keys()):
             watch = self._pairs.setdefault(pair, HazardLifeCycle("proximity", pair, self._params))
@@ -99,11 +116,13 @@ class HazardMonitor(protocols.HazardMonitor):
                 followed = reasons.keys() >= set(pair)
                 events.append(watch.lose(time_s, NOT_WATCHED if followed else TRACK_LOST))
             elif (levels := levels_of(reading, self._params)) is not None:
-                events.append(watch.measure(time_s, reading, levels.near, levels.breached, rare=rare))
+                at_once = rare or (pair in new and levels.breached.sure)
+                events.append(watch.measure(time_s, reading, levels.near, levels.breached, at_once=at_once))
             else:
                 reason = reasons.get(pair[0]) or reasons.get(pair[1]) or NOT_MEASURED
                 events.append(watch.miss(time_s, reason, may_open=bool(ground)))
         self._pairs = {pair: watch for pair, watch in self._pairs.items() if watch.is_open or pair in readings}
+        events += self._suspected.update(time_s, positions, watched)
         events += self._zones.update(time_s, positions, ground, rare=rare)
         self._load.update(time_s, positions, events)
         return _said(events)
@@ -121,7 +140,9 @@ class HazardMonitor(protocols.HazardMonitor):
         for pair in sorted(self._pairs):
             events += [self._pairs[pair].finish(time_s), self._pairs[pair].end(time_s, reason, phase)]
         self._map, self._pairs = AbsenceWatch(self._params, MAP_IS_BACK), {}
+        self._newcomers = Newcomers[Pair]()
         self._sight = AbsenceWatch(self._params, WATCHED_AGAIN)
+        events += self._suspected.end(time_s, reason, phase)
         return _said(events + self._zones.end(time_s, reason, phase))
 
     def _unseeing(self, watched: WatchedGround) -> str:
@@ -139,8 +160,10 @@ class HazardMonitor(protocols.HazardMonitor):
         self._follow = UnfollowedHazard(self._params)
         self._sight = AbsenceWatch(self._params, WATCHED_AGAIN)
         self._pairs = {}
+        self._newcomers = Newcomers[Pair]()
         self._load = AlarmLoad()
         self._looked_s = math.inf
+        self._suspected.reset()
         self._zones = ZoneRule(self._given_zones, self._params)
 
 

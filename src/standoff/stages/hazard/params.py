@@ -63,7 +63,10 @@ class HazardParams:
     min_duration_s: Annotated[
         float,
         Ge(0),
-        Doc("A level must hold so many seconds before it is said: one bad frame is no alarm. 0 says it at once."),
+        Doc(
+            "A level must hold so many seconds before it is said: one bad frame is no alarm. 0 says it at once, and so "
+            "is said who is inside beyond doubt when first measured."
+        ),
     ] = 0.2
     release_s: Annotated[float, Ge(0), Doc("The gap must be wide enough for so many seconds before a level ends.")] = (
         0.5

@@ -15,7 +15,9 @@ from standoff.core.zones import NOT_PLACED, Zone
 from standoff.stages.hazard.absence import AbsenceWatch
 from standoff.stages.hazard.inside_zone import probability_inside
 from standoff.stages.hazard.latch import NOT_MEASURED, NOT_WATCHED, TRACK_LOST, UNMEASURED, LastPhase, Reading
+from standoff.stages.hazard.levels import SURE
 from standoff.stages.hazard.life_cycle import HazardLifeCycle, Limit
+from standoff.stages.hazard.newcomers import Newcomers
 from standoff.stages.hazard.params import HazardParams
 
 PLACED = "the zones can be found again"
@@ -74,6 +76,7 @@ class ZoneRule:
         self._unplaced = AbsenceWatch(params, PLACED, "zone")
         self._watches: dict[Key, HazardLifeCycle] = {}
         self._last: dict[int, tuple[float, FloatArray]] = {}
+        self._newcomers = Newcomers[int]()
         self._mapped_frames = self._unplaced_frames = 0
 
     @property
@@ -105,9 +108,10 @@ class ZoneRule:
         if not ground.frame_stated:
             return events + self._miss_all(time_s, positions, NOT_PLACED)
         self._remember(time_s, positions)
+        new = self._newcomers.among(time_s, positions.track_id[positions.valid].tolist())
         alive = set(positions.track_id.tolist())
         for zone in self._zones:
-            stands = self._stands(time_s, zone, positions)
+            stands = self._stands(time_s, zone, positions, new)
             watched = dict(self._watched(zone, positions, stands))
             of_zone = {key for key in self._watches if key[0] == zone.name}
             for key in sorted(of_zone | {(zone.name, tracks) for tracks, may_open in watched.items() if may_open}):
@@ -127,6 +131,7 @@ class ZoneRule:
         for key in sorted(self._watches):
             events += [self._watches[key].finish(time_s), self._watches[key].end(time_s, reason, phase)]
         self._unplaced, self._watches, self._last = AbsenceWatch(self._params, PLACED, "zone"), {}, {}
+        self._newcomers = Newcomers[int]()
         return events
 
     def _miss_all(self, time_s: float, positions: GroundPositions, reason: str) -> list[Hazard | None]:
@@ -156,7 +161,7 @@ class ZoneRule:
             if watch.is_open or (alive >= set(key[1]) and not watch.is_idle)
         }
 
-    def _stands(self, time_s: float, zone: Zone, positions: GroundPositions) -> dict[int, _Stand]:
+    def _stands(self, time_s: float, zone: Zone, positions: GroundPositions, new: set[int]) -> dict[int, _Stand]:
         """Return where each track is to a zone."""
         warn_m, hysteresis_m = self._params.zone_warn_m, self._params.hysteresis_m
         gap_m, sigma_m, inside = _measured(zone, positions)
@@ -171,7 +176,7 @@ class ZoneRule:
             stands[track] = _Stand(
                 Reading(max(gap, 0.0), gap, float(sigma_m[row])) if located else UNMEASURED,
                 Limit(bool(near[row]), bool(near_clear[row])),
-                Limit(bool(breached[row]), bool(breached_clear[row])),
+                Limit(bool(breached[row]), bool(breached_clear[row]), track in new and bool(inside[row] >= SURE)),
                 "" if located else positions.reason[row] or NOT_MEASURED,
                 bool(near[row]) if located else self._may_be_in(time_s, zone, track, int(positions.class_id[row])),
             )
@@ -228,5 +233,9 @@ def _follow(watch: HazardLifeCycle, time_s: float, stands: list[_Stand], rare: b
         return watch.miss(time_s, reason, may_open=True)
     furthest = max(outside or located, key=lambda one: one.reading.gap_m)
     near = Limit(all(one.near.passed for one in located), any(one.near.clear for one in located))
-    breached = Limit(all(one.breached.passed for one in located), any(one.breached.clear for one in located))
-    return watch.measure(time_s, furthest.reading, near, breached, rare=rare)
+    breached = Limit(
+        all(one.breached.passed for one in located),
+        any(one.breached.clear for one in located),
+        all(one.breached.sure for one in stands),
+    )
+    return watch.measure(time_s, furthest.reading, near, breached, at_once=rare or breached.sure)

@@ -14,22 +14,17 @@ from typing import Final
 
 import numpy as np
 
-from standoff.core.classes import CLASS_BY_NAME
-from standoff.core.durations import have_lasted
+from standoff.core.classes import CAB_WITHIN_M
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.roles import IS_EQUIPMENT
-from standoff.core.types import GroundPositions, IntArray, TextArray
+from standoff.core.types import PARKED, GroundPositions, IntArray, TextArray
 from standoff.stages.proximity.params import ProximityParams
 
-PARKED = "the machine is parked"
 IN_CAB = "in the cab"
 TOGETHER = "work together"
 
-_CAB_WITHIN_M: Final = 2.5
-"""A driver is so near to the middle of the machine, all the way."""
 _CAB_TRAVEL_M: Final = 4.0
 """Nobody who walks beside it keeps so near while it drives so far."""
-_EXCAVATOR = CLASS_BY_NAME["excavator"].id
 
 Pair = tuple[int, int]
 
@@ -71,18 +66,12 @@ class Excuses:
         excuse: TextArray = np.full(len(a), "", dtype=object)
         machine = np.where(IS_EQUIPMENT[positions.class_id[a]], a, b)
         mixed = IS_EQUIPMENT[positions.class_id[a]] != IS_EQUIPMENT[positions.class_id[b]]
-        excuse[mixed & self._parked(positions, machine)] = PARKED
+        excuse[mixed & positions.parked(self._params.parked_after_s)[machine]] = PARKED
         excuse[mixed & self._riding(positions, a, b, machine, distance_m)] = IN_CAB
         if self._together:
             excuse[[pair in self._together for pair in _ids(positions, a, b)]] = TOGETHER
         excuse[np.isnan(distance_m)] = ""
         return excuse
-
-    def _parked(self, positions: GroundPositions, machine: IntArray) -> BoolArray:
-        after_s = np.inf if self._params.parked_after_s is None else self._params.parked_after_s
-        swings = positions.class_id[machine] == _EXCAVATOR
-        parked: BoolArray = have_lasted(positions.standing_s[machine], after_s) & ~swings
-        return parked
 
     def _riding(
         self, positions: GroundPositions, a: IntArray, b: IntArray, machine: IntArray, distance_m: FloatArray
@@ -93,7 +82,7 @@ class Excuses:
         if not self._params.cabs:
             return riding
         # Among hundreds of pairs hardly any is so near.
-        (rows,) = np.nonzero(~(distance_m > _CAB_WITHIN_M))
+        (rows,) = np.nonzero(~(distance_m > CAB_WITHIN_M))
         for row, pair in zip(rows.tolist(), _ids(positions, a[rows], b[rows]), strict=True):
             ride = self._rides.get(pair)
             if np.isnan(distance_m[row]):
@@ -104,7 +93,7 @@ class Excuses:
             at_m = positions.xy_m[machine[row]]
             ride = ride or _Ride(at_m)
             moved_m = float(np.linalg.norm(at_m - ride.at_m))
-            if moved_m >= _CAB_WITHIN_M / 4.0:
+            if moved_m >= CAB_WITHIN_M / 4.0:
                 # In strides, because the noise of a place that stands would add up.
                 ride = _Ride(at_m, ride.travelled_m + moved_m)
             rides[pair] = ride

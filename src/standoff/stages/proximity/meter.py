@@ -9,6 +9,7 @@ import numpy as np
 from standoff.core import protocols
 from standoff.core.classes import CLASS_BY_NAME, CLASSES, Role
 from standoff.core.homography import BoolArray, FloatArray
+from standoff.core.roles import IS_EQUIPMENT, IS_PERSON
 from standoff.core.types import GroundMap, GroundPositions, IntArray, NoGroundMap, Proximities
 from standoff.stages.proximity.excuses import Excuses
 from standoff.stages.proximity.outliers import PaperFilter
@@ -114,6 +115,11 @@ def _watched_classes(pairs: tuple[tuple[str, str], ...]) -> BoolArray:
         members = np.outer(_members(side_a), _members(side_b))
         watched |= members | members.T
     return watched
+
+
+def machines_near_people(pairs: tuple[tuple[str, str], ...]) -> BoolArray:
+    """Return (C,) by class id: which machines are measured against people."""
+    return np.asarray(_watched_classes(pairs)[IS_PERSON].any(axis=0) & IS_EQUIPMENT)
 
 
 def side_classes(side: str) -> frozenset[str]:

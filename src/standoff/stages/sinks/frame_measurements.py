@@ -44,6 +44,7 @@ class FrameMeasurements:
         positions: Row i belongs to track i.
         proximities: All configured pairs.
         hazards: Open hazards by pair.
+        machine_hazards: Open hazards of machines near which somebody may stand whom no track shows.
         zones: All of the site.
         zone_hazards: Open hazards of zones.
         hidden_px: (N, 4) boxes of the picture to be made unrecognisable, in full-size pixels.
@@ -59,6 +60,7 @@ class FrameMeasurements:
     positions: GroundPositions
     proximities: Proximities
     hazards: Mapping[Pair, Hazard]
+    machine_hazards: tuple[Hazard, ...] = ()
     zones: tuple[Zone, ...] = ()
     zone_hazards: tuple[Hazard, ...] = ()
     hidden_px: FloatArray = field(default_factory=lambda: np.zeros((0, 4)))
@@ -82,6 +84,7 @@ class FrameMeasurements:
             positions=result.positions,
             proximities=result.proximities,
             hazards=result.open_hazards.by_pair(),
+            machine_hazards=result.open_hazards.of_machines(),
             zones=zones,
             zone_hazards=result.open_hazards.in_zones() if zones else (),
             hidden_px=np.zeros((0, 4)) if hidden_px is None else hidden_px,
@@ -108,6 +111,10 @@ class FrameMeasurements:
             for track_id in hazard.track_ids:
                 words.setdefault(track_id, []).append(f"{where} {hazard.zone}")
         return {track_id: ", ".join(dict.fromkeys(texts)) for track_id, texts in words.items()}
+
+    def machine_words(self) -> dict[int, str]:
+        """Return why each machine with a hazard of its own has one: "somebody may stand near it"."""
+        return {track_id: hazard.reason for hazard in self.machine_hazards for track_id in hazard.track_ids}
 
     def unknown_words(self) -> str:
         """Return why the whole picture is unknown, or much of it: for a bar across it; "" where it is not."""
@@ -140,7 +147,7 @@ class FrameMeasurements:
     def track_tones(self) -> list[Tone]:
         """Return the colour of each track: of its gravest hazard, else of its class; grey when it has no position."""
         gravest: dict[int, Severity] = {}
-        for hazard in (*self.hazards.values(), *self.zone_hazards):
+        for hazard in (*self.hazards.values(), *self.machine_hazards, *self.zone_hazards):
             for track_id in hazard.track_ids:
                 gravest[track_id] = worse(hazard.severity, gravest.get(track_id, "unknown"))
         tones: list[Tone] = []

@@ -177,7 +177,7 @@ def _label_lines(painter: Painter, to_canvas: _ToCanvas, sketch: Sketch) -> None
 def _label_boxes(painter: Painter, to_canvas: _ToCanvas, sketch: Sketch) -> None:
     measurements, tones = sketch.measurements, sketch.tones
     corners = to_canvas(measurements.tracks.xyxy_px).reshape(-1, 4).tolist()
-    remarks = measurements.zone_words(), measurements.around_words()
+    remarks = measurements.zone_words(), measurements.machine_words(), measurements.around_words()
     names = [
         ", ".join([name, *(words[track] for words in remarks if track in words)])
         for track, name in measurements.names().items()

@@ -29,7 +29,7 @@ class WatchedParams:
         Interval(ge=0, le=1),
         Doc(
             "Where the detector is so sure of a worker, and no track shows him, somebody may stand: the ground is not "
-            "watched. 1 is never."
+            "watched, and near a machine it is a hazard of unknown severity. 1 is never."
         ),
     ] = 0.2
     suspect_s: Annotated[float, Ge(0), Doc("For so long after it was seen.")] = 2.0

@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 
 from standoff.core.boxes import areas_px2, shared_px2
+from standoff.core.classes import CAB_WITHIN_M
 from standoff.core.homography import BoolArray, FloatArray
 from standoff.core.roles import IS_PERSON
 from standoff.core.types import Detections, GroundMap, Tracks
@@ -40,11 +41,13 @@ class Suspects:
         """Take what was detected in a frame; of whom a track shows, where he is is known."""
         if ground.site_frame != self._site_frame:
             self._places_m, self._seen_s, self._site_frame = np.zeros((0, 2)), np.zeros(0), ground.site_frame
-        people = tracks[IS_PERSON[tracks.class_id]]
-        maybe = detections[IS_PERSON[detections.class_id] & (detections.score >= self._params.suspect_score)]
-        maybe = maybe[~_is_one_of(maybe.xyxy_px, people.xyxy_px)]
-        places_m, on_ground = ground.to_ground(_feet_px(maybe))
-        lasting = (time_s - self._seen_s <= self._params.suspect_s) & ~self._shown(people, ground)
+        people_px = tracks.xyxy_px[IS_PERSON[tracks.class_id]]
+        maybe = np.flatnonzero(IS_PERSON[detections.class_id] & (detections.score >= self._params.suspect_score))
+        maybe = maybe[~_is_one_of(detections.xyxy_px[maybe], people_px)]
+        if not len(maybe) and not len(self):
+            return
+        places_m, on_ground = ground.to_ground(_feet_px(detections[maybe]))
+        lasting = (time_s - self._seen_s <= self._params.suspect_s) & ~self._shown(people_px, ground)
         self._places_m = np.concatenate([places_m[on_ground], self._places_m[lasting]])
         self._seen_s = np.concatenate([np.full(np.count_nonzero(on_ground), time_s), self._seen_s[lasting]])
         # Who is seen again and again is remembered once, as of the last time.
@@ -73,10 +76,21 @@ class Suspects:
         cells[places[:, 0], places[:, 1]] = True
         return cells
 
-    def _shown(self, people: Tracks, ground: GroundMap) -> BoolArray:
+    def near(self, xy_m: FloatArray, reach_m: FloatArray) -> BoolArray:
+        """Tell (N,) within whose reach somebody may stand who is on none of them.
+
+        Args:
+            xy_m: (N, 2) where machines are, site frame.
+            reach_m: (N,).
+        """
+        away_m = np.linalg.norm(self._places_m[:, None] - xy_m, axis=2)
+        beside = ~(away_m <= CAB_WITHIN_M).any(axis=1, keepdims=True)
+        return np.asarray((beside & (away_m < reach_m)).any(axis=0))
+
+    def _shown(self, people_px: FloatArray, ground: GroundMap) -> BoolArray:
         """Tell (N,) of which places a track's box holds the picture now."""
         points_px, seen = ground.to_image(self._places_m)
-        left, top, right, bottom = people.xyxy_px.T[:, :, None]
+        left, top, right, bottom = people_px.T[:, :, None]
         # Who was suspected at his feet is followed by a box that ends there, or a little above.
         low = bottom + 0.25 * (bottom - top)
         x, y = points_px.T

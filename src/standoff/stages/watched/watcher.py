@@ -126,7 +126,8 @@ class GroundWatcher(protocols.GroundWatcher):
             self._judged_s = -math.inf
             self._looks += 1
             cells = np.full((ROWS, COLUMNS), NO_MAP, dtype=np.int8)
-            return WatchedGround(cells, nothing, np.full(len(tracks), np.nan))
+            nowhere = np.zeros(len(tracks), dtype=np.bool_)
+            return WatchedGround(cells, nothing, np.full(len(tracks), np.nan), nowhere)
         if frame.time_s - self._judged_s >= self._params.judge_every_s - _TIME_ROUNDING_S:
             self._judge(frame, ground)
             self._looks += 1
@@ -135,8 +136,13 @@ class GroundWatcher(protocols.GroundWatcher):
         cells[self._behind_machines(tracks, frame.size_px) & (cells == WATCHED)] = BEHIND_MACHINE
         self._suspects.note(frame.time_s, detections, tracks, ground)
         cells[self._suspects.cells(ground, frame.size_px, _DISC) & (cells != NO_GROUND)] = MAYBE_SOMEBODY
-        around = self._around(cells, positions, ground, frame.size_px)
-        return WatchedGround(cells, np.where(cells == WATCHED, self._found, np.nan), around)
+        around, suspects = np.full(len(positions), np.nan), np.zeros(len(positions), dtype=np.bool_)
+        machines = positions.valid & IS_EQUIPMENT[positions.class_id]
+        if machines.any():
+            xy_m, reach_m = positions.xy_m[machines], positions.radius_m[machines] + self._worker_radius_m
+            around[machines] = _around(cells, xy_m, reach_m, ground, frame.size_px)
+            suspects[machines] = self._suspects.near(xy_m, reach_m)
+        return WatchedGround(cells, np.where(cells == WATCHED, self._found, np.nan), around, suspects)
 
     def _judge(self, frame: Frame, ground: GroundMap) -> None:
         params, size_px = self._params, frame.size_px
@@ -177,30 +183,25 @@ class GroundWatcher(protocols.GroundWatcher):
 
     @staticmethod
     def _behind_machines(tracks: Tracks, size_px: tuple[int, int]) -> BoolArray:
-        machines = tracks[IS_EQUIPMENT[tracks.class_id]]
-        left, top, right, bottom = machines.xyxy_px.T[:, :, None]
-        foot_y = np.where(
-            np.isfinite(machines.foot_px[:, 1:]), machines.foot_px[:, 1:], top + _FOOT_LEVEL * (bottom - top)
-        )
+        machines = IS_EQUIPMENT[tracks.class_id]
+        left, top, right, bottom = tracks.xyxy_px[machines].T[:, :, None]
+        foot_y = tracks.foot_px[machines, 1:]
+        foot_y = np.where(np.isfinite(foot_y), foot_y, top + _FOOT_LEVEL * (bottom - top))
         x, y = cell_middles_px(size_px).T
         behind = (x >= left) & (x <= right) & (y >= top) & (y <= np.minimum(foot_y, bottom))
         return np.asarray(behind.any(axis=0).reshape(ROWS, COLUMNS))
 
-    def _around(
-        self, cells: CellArray, positions: GroundPositions, ground: GroundMap, size_px: tuple[int, int]
-    ) -> FloatArray:
-        """Return (M,) what share of the circle about each machine is watched."""
-        asked = positions.valid & IS_EQUIPMENT[positions.class_id]
-        around: FloatArray = np.full(len(positions), np.nan)
-        if not asked.any():
-            return around
-        radius_m = positions.radius_m[asked] + self._worker_radius_m
-        points_m = positions.xy_m[asked][:, None] + radius_m[:, None, None] * _DISC
-        points_px, seen = ground.to_image(points_m.reshape(-1, 2))
-        places, inside = cell_of(points_px, size_px)
-        watched = seen & inside & (cells[places[:, 0], places[:, 1]] == WATCHED)
-        around[asked] = watched.reshape(len(radius_m), -1).mean(axis=1)
-        return around
+
+def _around(
+    cells: CellArray, xy_m: FloatArray, reach_m: FloatArray, ground: GroundMap, size_px: tuple[int, int]
+) -> FloatArray:
+    """Return (N,) what share of the circle about each machine is watched."""
+    points_m = xy_m[:, None] + reach_m[:, None, None] * _DISC
+    points_px, seen = ground.to_image(points_m.reshape(-1, 2))
+    places, inside = cell_of(points_px, size_px)
+    watched = seen & inside & (cells[places[:, 0], places[:, 1]] == WATCHED)
+    share: FloatArray = watched.reshape(len(reach_m), -1).mean(axis=1)
+    return share
 
 
 def _disc() -> FloatArray:
