@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import socket
 import time
+import weakref
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -97,9 +98,13 @@ def ray_dies(plan: FilmPlan) -> FilmResult:
     raise ERRORS.LocalRayletDiedError
 
 
-@pytest.mark.parametrize("deaths", [1, 3, 9])
-def test_a_ray_of_our_own_that_dies_is_begun_anew_as_often_as_a_film_is(deaths: int) -> None:
-    scripted, restarts = ScriptedRay({"1": ray_dies}), []
+@pytest.mark.parametrize("deaths", [1, 6, 9])
+def test_a_ray_of_our_own_that_dies_is_begun_anew_after_longer_and_longer_rests(
+    deaths: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scripted, restarts = ScriptedRay({"1": ray_dies}), list[int]()
+    rests = list[float]()
+    monkeypatch.setattr(time, "sleep", rests.append)
 
     def restart() -> None:
         restarts.append(1)
@@ -108,9 +113,39 @@ def test_a_ray_of_our_own_that_dies_is_begun_anew_as_often_as_a_film_is(deaths: 
 
     results = {one.film.stem: one for one in pool.Machines(Connection(scripted, restart), 2).watch(plans(5))}
     assert {name: one.status for name, one in results.items()} == {
-        "0": "complete", "1": "complete" if deaths < 4 else "failed", "2": "complete", "3": "complete", "4": "complete",
+        "0": "complete", "1": "complete" if deaths < 7 else "failed", "2": "complete", "3": "complete", "4": "complete",
     }  # fmt: skip
-    assert len(restarts) == min(deaths, 3)
+    assert rests == [1.0, 2.0, 4.0, 8.0, 16.0, 16.0][:deaths]
+    assert len(restarts) == len(rests)
+    if deaths == 9:
+        assert results["1"].message.startswith("Ray died 7 times: ")
+
+
+def test_what_a_process_returned_is_let_go_before_ray_is_begun_anew() -> None:
+    # References of two Rays have the same names: one that outlives its own lets go what is not its own.
+    class Reference:
+        """As Ray's, one of which another Ray must not find alive."""
+
+    class Refers(ScriptedRay):
+        def remote(self, *words: Any) -> Any:
+            if len(words) != 2:
+                return self
+            reference: Any = Reference()
+            alive.add(reference)
+            named[id(reference)] = words[0]
+            return reference
+
+        def get(self, plan: Any) -> FilmResult:
+            return super().get(named[id(plan)])
+
+    def restart() -> None:
+        assert not alive
+        scripted.script.clear()
+
+    alive, named = weakref.WeakSet[Any](), dict[int, FilmPlan]()
+    scripted = Refers({"0": ray_dies})
+    results = list(pool.Machines(Connection(scripted, restart), 2).watch(plans(2)))
+    assert [one.status for one in results] == ["complete", "complete"]
 
 
 def test_a_cluster_is_not_begun_anew() -> None:

@@ -34,6 +34,8 @@ _ENVIRONMENT: Final = {
     "RAY_BACKEND_LOG_LEVEL": "fatal",
     # Without it Ray hides the graphics cards from whoever does not ask for one.
     "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",
+    # Ray gives itself up when a process of its own needs longer to start, as it may where others are at work.
+    "RAY_agent_register_timeout_ms": "120000",
 }
 
 
@@ -93,6 +95,8 @@ def _start(ray: Any, cores: int | None, folder: Path) -> None:  # noqa: ANN401
             with _deaf():
                 ray.init(
                     "local",
+                    # Nobody else is to reach it, and whatever becomes of the network, it is there.
+                    _node_ip_address="127.0.0.1",
                     num_cpus=cores,
                     include_dashboard=False,
                     object_store_memory=_STORE_BYTES,

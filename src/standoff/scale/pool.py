@@ -6,7 +6,7 @@ import math
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -21,6 +21,10 @@ PART_S: Final = 600.0
 """Films longer than one and a half of it are looked at in parts; a process takes seconds to start."""
 _TRIES_AGAIN: Final = 3
 """So often a film begins again whose process was killed; one that kills every process is bad itself."""
+_RAY_DIES: Final = 6
+"""So often Ray itself may die while a film is watched or waits, which is not the film's fault."""
+_RESTS_S: Final = 16.0
+"""Before Ray is begun anew, at the most: what it died of may pass, and each time we wait twice as long for that."""
 _AHEAD: Final = 2
 """So many films wait for each that is watched: a list of ten thousand is not held by anybody."""
 _LETS_GO_WITHIN_S: Final = 30.0
@@ -60,10 +64,11 @@ def watch_films(
 
 @dataclass(frozen=True, slots=True)
 class _Handed:
-    """A film or a part of one that a process has, and how many processes were lost with it before."""
+    """A film or a part of one that a process has; how many were lost with it before, and how often Ray died."""
 
     work: Work
     lost: int = 0
+    ray_died: int = 0
 
 
 class Machines:
@@ -138,16 +143,18 @@ class Machines:
         What was lost with its process begins again; a film whose parts are all looked at is handed out to be watched.
         """
         while True:
-            done, _ = self._ray.wait(list(waiting), num_returns=1, timeout=_LOOKS_EVERY_S)
+            done = self._ray.wait(list(waiting), num_returns=1, timeout=_LOOKS_EVERY_S)[0]
             if done:
                 handed = waiting.pop(done[0])
+                came = self._got(done.pop())
+                if isinstance(came, self._ray.exceptions.RayError) and self._begins_again(waiting, handed, came):
+                    continue
                 if isinstance(handed.work, FilmPart):
-                    self._take_part(waiting, done[0], handed.work, handed.lost)
-                    return
-                result = self._result(waiting, done[0], handed.work, handed.lost)
-                if result is not None:
-                    yield result
-                    return
+                    # What went wrong with it, whoever watches the film meets again and says so.
+                    self._end_part(waiting, handed.work)
+                else:
+                    yield self._result(handed, handed.work, came)
+                return
             if self._places():
                 self._seen_s = time.monotonic()
             elif time.monotonic() - self._seen_s > _NO_MACHINE_S:
@@ -159,19 +166,6 @@ class Machines:
                 yield FilmResult(work.film, work.out, "failed", message)
                 return
 
-    def _take_part(self, waiting: dict[Any, _Handed], done: Any, part: FilmPart, lost: int) -> None:  # noqa: ANN401
-        """Begin a part again whose process was lost; otherwise it has come to its end, one way or the other."""
-        errors = self._ray.exceptions
-        try:
-            self._ray.get(done)
-        except errors.RayTaskError:
-            pass  # Whoever watches the film meets the same fault, and says so.
-        except errors.RayError as error:
-            if lost < _TRIES_AGAIN:
-                self._begin_again(waiting, _Handed(part, lost), error)
-                return
-        self._end_part(waiting, part)
-
     def _end_part(self, waiting: dict[Any, _Handed], part: FilmPart) -> None:
         """Hand a film out to be watched when nobody looks at a part of it any more."""
         self._on_part(part)
@@ -179,34 +173,53 @@ class Machines:
         if not self._parts_left[part.plan.out]:
             self._hand(waiting, _Handed(part.plan))
 
-    def _result(self, waiting: dict[Any, _Handed], done: Any, plan: FilmPlan, lost: int) -> FilmResult | None:  # noqa: ANN401
-        """Return the result of a film; None: its process was lost, and another watches it."""
-        errors = self._ray.exceptions
+    def _got(self, reference: Any) -> Any:  # noqa: ANN401
+        """Return what came of what was handed out, or Ray's error."""
         try:
-            result: FilmResult = self._ray.get(done)
-        except errors.RayTaskError as error:
-            # A fault of ours in one film, or of a stage of somebody's own: the others go on.
-            return FilmResult(plan.film, plan.out, "failed", one_line(f"{type(error.cause).__name__}: {error.cause}"))
-        except errors.RayError as error:
-            if lost < _TRIES_AGAIN:
-                self._begin_again(waiting, _Handed(plan, lost), error)
-                return None
-            message = one_line(f"its process was lost {_TRIES_AGAIN + 1} times: {error}")
-            return FilmResult(plan.film, plan.out, "failed", message)
-        return result
+            return self._ray.get(reference)
+        except self._ray.exceptions.RayError as error:
+            # Its traceback would keep the reference alive, which the next Ray takes for one of its own and lets go.
+            return error.with_traceback(None)
 
-    def _begin_again(self, waiting: dict[Any, _Handed], handed: _Handed, error: Exception) -> None:
-        """Hand out again what was lost with its process.
+    def _result(self, handed: _Handed, plan: FilmPlan, came: Any) -> FilmResult:  # noqa: ANN401
+        """Return the result of a film that is not begun again."""
+        errors = self._ray.exceptions
+        if isinstance(came, errors.RayTaskError):
+            # A fault of ours in one film, or of a stage of somebody's own: the others go on.
+            message = f"{type(came.cause).__name__}: {came.cause}"
+        elif self._is_our_rays_death(came):
+            message = f"Ray died {handed.ray_died + 1} times: {came}"
+        elif isinstance(came, errors.RayError):
+            message = f"its process was lost {handed.lost + 1} times: {came}"
+        else:
+            result: FilmResult = came
+            return result
+        return FilmResult(plan.film, plan.out, "failed", one_line(message))
+
+    def _is_our_rays_death(self, came: Any) -> bool:  # noqa: ANN401
+        return self._restart is not None and isinstance(came, self._ray.exceptions.LocalRayletDiedError)
+
+    def _begins_again(self, waiting: dict[Any, _Handed], handed: _Handed, error: Exception) -> bool:
+        """Hand out again what was lost with its process; False: its fault is its own, or that happened too often.
 
         On a busy machine Ray itself may die; then it is begun anew, and so is all that waits.
         """
-        again = [handed]
-        if self._restart is not None and isinstance(error, self._ray.exceptions.LocalRayletDiedError):
-            again += waiting.values()
+        if isinstance(error, self._ray.exceptions.RayTaskError):
+            return False
+        if self._restart is not None and self._is_our_rays_death(error):
+            if handed.ray_died == _RAY_DIES:
+                return False
+            again = [replace(one, ray_died=one.ray_died + 1) for one in (handed, *waiting.values())]
             waiting.clear()
+            time.sleep(min(2.0**handed.ray_died, _RESTS_S))
             self._restart()
+        elif handed.lost == _TRIES_AGAIN:
+            return False
+        else:
+            again = [replace(handed, lost=handed.lost + 1)]
         for one in again:
-            self._hand(waiting, _Handed(one.work, one.lost + 1))
+            self._hand(waiting, one)
+        return True
 
     def _places(self) -> int:
         """Return how many films can be watched at once now: machines come and go."""
