@@ -19,6 +19,8 @@ from standoff.service.setup.answers import TrialAnswer, TrialState, TrialSummary
 _OUTPUTS: Final = ("video", "report", "tracks", "proximity", "frames", "hazards")
 SHOWN: Final = {"film": OUTPUTS["video"], "report": OUTPUTS["report"]}
 """What of a trial the page may show, by the name that it asks for."""
+_ENDS_WITHIN_S: Final = 20.0
+"""A trial that is stopped analyses the picture in hand and writes its files."""
 
 
 class Trial:
@@ -32,10 +34,11 @@ class Trial:
     def __init__(self, film: Path, changed: Callable[[], None]) -> None:
         self._film = film
         self._changed = changed
-        self._folder = TemporaryDirectory(prefix="standoff-trial-")
+        self._folder = TemporaryDirectory(prefix="standoff-trial-", ignore_cleanup_errors=True)
         self._lock = threading.Lock()
         self._number = 0
         self._answer = TrialAnswer(state="none")
+        self._threads: list[threading.Thread] = []
 
     @property
     def answer(self) -> TrialAnswer:
@@ -52,9 +55,10 @@ class Trial:
         with self._lock:
             self._number += 1
             self._answer = TrialAnswer(state="running", number=self._number)
-            number = self._number
-        threading.Thread(target=self._run, args=(settings, number), daemon=True).start()
-        return self._answer
+            thread = threading.Thread(target=self._run, args=(settings, self._number), daemon=True)
+            self._threads = [*(one for one in self._threads if one.is_alive()), thread]
+            thread.start()
+            return self._answer
 
     def stop(self) -> None:
         """End the running one after the picture in hand."""
@@ -63,8 +67,10 @@ class Trial:
             self._answer = TrialAnswer(state="stopped", number=self._number)
 
     def close(self) -> None:
-        """End the running one, and remove what trials have written."""
+        """End the running one, and remove what trials have written when none writes any more."""
         self.stop()
+        for thread in self._threads:
+            thread.join(_ENDS_WITHIN_S)
         self._folder.cleanup()
 
     def file(self, name: str, number: int) -> Path | None:
