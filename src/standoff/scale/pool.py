@@ -187,7 +187,7 @@ class Machines:
         if isinstance(came, errors.RayTaskError):
             # A fault of ours in one film, or of a stage of somebody's own: the others go on.
             message = f"{type(came.cause).__name__}: {came.cause}"
-        elif self._is_our_rays_death(came):
+        elif self._restart_after(came):
             message = f"Ray died {handed.ray_died + 1} times: {came}"
         elif isinstance(came, errors.RayError):
             message = f"its process was lost {handed.lost + 1} times: {came}"
@@ -196,8 +196,9 @@ class Machines:
             return result
         return FilmResult(plan.film, plan.out, "failed", one_line(message))
 
-    def _is_our_rays_death(self, came: Any) -> bool:  # noqa: ANN401
-        return self._restart is not None and isinstance(came, self._ray.exceptions.LocalRayletDiedError)
+    def _restart_after(self, came: Any) -> Callable[[], None] | None:  # noqa: ANN401
+        """Return what begins Ray anew where it died and is our own."""
+        return self._restart if isinstance(came, self._ray.exceptions.LocalRayletDiedError) else None
 
     def _begins_again(self, waiting: dict[Any, _Handed], handed: _Handed, error: Exception) -> bool:
         """Hand out again what was lost with its process; False: its fault is its own, or that happened too often.
@@ -206,13 +207,13 @@ class Machines:
         """
         if isinstance(error, self._ray.exceptions.RayTaskError):
             return False
-        if self._restart is not None and self._is_our_rays_death(error):
+        if restart := self._restart_after(error):
             if handed.ray_died == _RAY_DIES:
                 return False
             again = [replace(one, ray_died=one.ray_died + 1) for one in (handed, *waiting.values())]
             waiting.clear()
             time.sleep(min(2.0**handed.ray_died, _RESTS_S))
-            self._restart()
+            restart()
         elif handed.lost == _TRIES_AGAIN:
             return False
         else:
